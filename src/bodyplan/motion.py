@@ -1,0 +1,188 @@
+"""Motion: what every planner returns and everything downstream takes; and the claims that it makes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array, TextArray, finite, frozen
+from bodyplan.errors import InputError, SolveError, Status, UnknownNameError
+from bodyplan.ground.base import Ground
+from bodyplan.robot.model import Robot
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the planner that the judge tests from forward kinematics and ground alone.
+
+    ``kind`` names the test in ``bodyplan.check``; ``data`` holds what it needs: numbers, texts, lists or
+    arrays (JSON types and float arrays). ``label`` is how the report names it. Kinds in use:
+
+    * ``at_rest``: frames ``frames`` do not move from ``start`` to ``end`` (s); ``stage`` names the phase;
+      ``tolerance`` m.
+    * ``on_curve``: origins of ``frames`` lie on a body curve from ``start`` to ``end``; ``curve`` is its
+      name in ``bodyplan.curves``, ``parameters`` arrays with one entry a sample, ``unit`` m per curve unit,
+      ``pose`` (T, 3) x, y, heading of the curve in the world, ``tolerance`` m.
+    * ``periodic``: after ``period`` s the joints repeat and the base is moved by ``advance`` (3,) m and
+      ``turn`` rad.
+    * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).
+    """
+
+    kind: str
+    label: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "data", {k: _settle(v) for k, v in self.data.items()})
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, Claim)
+            and (self.kind, self.label, self.data.keys()) == (other.kind, other.label, other.data.keys())
+            and all(_same(self.data[k], other.data[k]) for k in self.data)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.label))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A planned motion of one robot on one ground. All arrays are read-only.
+
+    ``t`` (T,) s, strictly increasing. ``base`` (T, 7) pose of the base: position m, quaternion wxyz,
+    world_from_base. ``q``, ``qd``, ``qdd`` (T, n) joint coordinates and derivatives, columns as
+    ``robot.joints``. ``contacts`` (T, c) True where the planner means contact c of ``robot.contacts`` to
+    carry load, or None. ``forces`` (T, c, 3) N and ``torques`` (T, n) N m where the gait gives them.
+    ``residual`` (T,) largest error of the planner's own equations; ``status`` (T,) a
+    :class:`bodyplan.Status` text a sample. ``facts``: named numbers of the plan (SI; the key says the unit
+    where it is not plain). ``stages``: (name, start, end) in s. ``notes``: corrections and remarks to show.
+    """
+
+    robot: Robot
+    ground: Ground
+    gait: Mapping[str, Any]
+    t: Array
+    base: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    residual: Array
+    status: TextArray
+    claims: tuple[Claim, ...] = ()
+    contacts: Array | None = None
+    forces: Array | None = None
+    torques: Array | None = None
+    facts: Mapping[str, float] = field(default_factory=dict)
+    stages: tuple[tuple[str, float, float], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        t = finite(self.t, "Motion.t", (None,))
+        if len(t) < 2 or np.any(np.diff(t) <= 0.0):
+            raise InputError("Motion.t: needs at least two times, strictly increasing.")
+        size, n = len(t), self.robot.n
+        shapes: dict[str, tuple[int, ...]] = {
+            "t": (size,), "base": (size, 7), "q": (size, n), "qd": (size, n), "qdd": (size, n), "residual": (size,),
+        }
+        c = len(self.robot.contacts)
+        for name, optional_shape in (("contacts", (size, c)), ("forces", (size, c, 3)), ("torques", (size, n))):
+            if getattr(self, name) is not None:
+                shapes[name] = optional_shape
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen(finite(getattr(self, name), f"Motion.{name}", shape)))
+        status = np.array(self.status, dtype="U24")
+        if status.shape != (size,):
+            raise InputError(f"Motion.status: expected shape ({size},), got {status.shape}.")
+        status.flags.writeable = False
+        object.__setattr__(self, "status", status)
+        norms = np.linalg.norm(self.base[:, 3:], axis=1)
+        if np.any(np.abs(norms - 1.0) > 1e-9):
+            raise InputError("Motion.base: quaternions must have length 1.")
+        object.__setattr__(self, "claims", tuple(self.claims))
+        object.__setattr__(self, "stages", tuple((str(a), float(b), float(c)) for a, b, c in self.stages))
+        object.__setattr__(self, "notes", tuple(self.notes))
+        object.__setattr__(self, "facts", {k: float(v) for k, v in self.facts.items()})
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the columns of ``q``."""
+        return self.robot.joints
+
+    @property
+    def ok(self) -> bool:
+        """True where every sample was solved."""
+        return bool(np.all(self.status == Status.OK.value))
+
+    def joint(self, name: str) -> Array:
+        """The column of ``q`` of one joint, (T,)."""
+        if name not in self.robot.joints:
+            raise UnknownNameError("joint", name, self.robot.joints)
+        return self.q[:, self.robot.joints.index(name)]
+
+    def raise_if_failed(self) -> Motion:
+        """This motion, or SolveError naming the first sample that was not solved."""
+        bad = np.flatnonzero(self.status != Status.OK.value)
+        if len(bad):
+            i = int(bad[0])
+            raise SolveError(str(self.status[i]), f"at t = {self.t[i]:.6g} s ({len(bad)} of {len(self.t)} samples)", i)
+        return self
+
+    def replace(self, **changes: Any) -> Motion:
+        """A copy with some fields changed (and checked again)."""
+        return replace(self, **changes)
+
+    def poses(self) -> Any:
+        """Poses of every frame at every sample: ``robot.forward(q, base)``."""
+        return self.robot.forward(self.q, self.base)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Motion):
+            return NotImplemented
+        plain = ("robot", "ground", "gait", "claims", "facts", "stages", "notes")
+        arrays = ("t", "base", "q", "qd", "qdd", "residual", "status", "contacts", "forces", "torques")
+        return all(getattr(self, f) == getattr(other, f) for f in plain) and all(
+            _same(getattr(self, f), getattr(other, f)) for f in arrays
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def times(start: float, stop: float, dt: float) -> Array:
+    """Evenly spaced times from ``start`` to ``stop`` s, both included; the step is the largest that is
+    <= ``dt`` (s) and divides the interval."""
+    from bodyplan.arrays import number
+
+    number(start, "start")
+    number(stop, "stop", above=start)
+    number(dt, "dt", above=0.0)
+    steps = max(1, int(np.ceil((stop - start) / dt * (1.0 - 1e-12))))
+    return np.linspace(start, stop, steps + 1)
+
+
+def _settle(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return frozen(value)
+    if isinstance(value, Mapping):
+        return {str(k): _settle(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_settle(v) for v in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    return value
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return a is not None and b is not None and np.array_equal(_array(a), _array(b))
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_same(a[k], b[k]) for k in a)
+    return bool(a == b)
+
+
+def _array(a: ArrayLike) -> Any:
+    return np.asarray(a)

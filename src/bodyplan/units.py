@@ -1,0 +1,78 @@
+"""Quantities with units: ``"30 deg"`` and ``"25 mm"`` become SI numbers and radians."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from bodyplan.errors import InputError
+
+#: dimension -> the SI unit that plain numbers are taken to be in
+SI_UNITS = {
+    "length": "m",
+    "angle": "rad",
+    "time": "s",
+    "mass": "kg",
+    "speed": "m/s",
+    "angular_rate": "rad/s",
+    "force": "N",
+    "torque": "N*m",
+    "curvature": "1/m",
+    "frequency": "Hz",
+    "none": "",
+}
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+def to_si(value: Any, dimension: str, field: str = "value") -> float:
+    """``value`` in SI units: a plain number is taken as SI already, a text is parsed with pint.
+
+    Raises InputError when the text is not a quantity or has another dimension than ``dimension``
+    (one of :data:`SI_UNITS`).
+    """
+    unit = SI_UNITS[dimension]
+    if isinstance(value, bool):
+        raise InputError(f"{field}: expected a {dimension} such as {_example(dimension)}, got {value!r}.")
+    if isinstance(value, (int, float, np.integer, np.floating)):
+        out = float(value)
+    elif isinstance(value, str):
+        import pint
+
+        try:
+            quantity = _registry().Quantity(value)
+            # frequency: pint reads Hz as 1/s, and keeps "rad" dimensionless
+            out = float(quantity.to(unit or "dimensionless").magnitude)
+        except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:
+            raise InputError(
+                f"{field}: {value!r} is not a {dimension}; write a number in {unit or 'no unit'} or a text "
+                f"such as {_example(dimension)}."
+            ) from error
+    else:
+        raise InputError(f"{field}: expected a {dimension} such as {_example(dimension)}, got {value!r}.")
+    if not np.isfinite(out):
+        raise InputError(f"{field}: must be finite, got {value!r}.")
+    return out
+
+
+def _example(dimension: str) -> str:
+    return {
+        "length": '"25 mm"',
+        "angle": '"30 deg"',
+        "time": '"0.5 s"',
+        "mass": '"50 g"',
+        "speed": '"30 mm/s"',
+        "angular_rate": '"90 deg/s"',
+        "force": '"5 N"',
+        "torque": '"0.5 N*m"',
+        "curvature": '"12 / m"',
+        "frequency": '"0.25 Hz"',
+        "none": "0.8",
+    }[dimension]
