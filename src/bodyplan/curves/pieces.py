@@ -1,0 +1,161 @@
+"""The concertina curve as a table of pieces: Numba kernels shared by the curve and by the fit of links.
+
+A piece is a row of :data:`COLUMNS` numbers. Rates are with respect to one progress variable t along which
+the shape parameters change, so that the fit can differentiate exactly.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+from numba import njit
+
+from bodyplan.arrays import Array
+from bodyplan.curves.dynamic import crossing_of, dynamic_jet, dynamic_value
+
+START, KIND, ORIGIN, V, VD, VDD, G, GD, GDD = range(9)
+COLUMNS = 9
+TAIL, MODULE, FLAT = 0.0, 1.0, 2.0
+CUT, PRODUCT, NATURAL = 0, 1, 2
+RULES = {"cut": CUT, "product": PRODUCT, "natural": NATURAL}
+
+
+@njit(cache=True)
+def build_pieces(
+    tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array
+) -> int:
+    """Fill ``out`` (>= N_B + 4, COLUMNS) for one curve; returns the number of pieces (kernel).
+
+    A straight line of length ``lead`` (>= 0) stands before the tail.
+
+    ``tail`` (3,): multiplier of the tail, its first and second rate. ``gammas`` (N_B + 1, 3): gamma of the body
+    modules from tail to head, then of the head, with rates. Rates are exact for the rules cut and product,
+    whose junctions stand still.
+    """
+    modules = gammas.shape[0] - 1
+    p = 0
+    if lead > 0.0:
+        out[0, :] = 0.0
+        out[0, KIND] = FLAT
+        p = 1
+    out[p, :] = 0.0
+    out[p, START], out[p, KIND], out[p, ORIGIN] = lead, TAIL, lead
+    v, vd, vdd = tail[0], tail[1], tail[2]
+    out[p, V], out[p, VD], out[p, VDD] = v, vd, vdd
+    x = lead + 0.5 * pi / omega
+    for k in range(modules + 1):
+        g, gd, gdd = gammas[k, 0], gammas[k, 1], gammas[k, 2]
+        p += 1
+        row = out[p]
+        row[START], row[KIND], row[ORIGIN] = x, MODULE, x
+        row[V], row[VD], row[VDD], row[G], row[GD], row[GDD] = v, vd, vdd, g, gd, gdd
+        head = k == modules
+        span = pi / omega
+        if rule == NATURAL and g < 1.0:
+            span = pi / (omega * sqrt(1.0 - g * g))
+        f, _, _, fg, _, fgg = dynamic_jet(span, g, omega)
+        if head or (rule == CUT and f >= 0.0):
+            # correction 3: a module that no longer crosses zero is followed to its own first zero, then y = 0
+            p += 1
+            out[p, :] = 0.0
+            out[p, START] = x + crossing_of(g, omega, crossing if head else 1)
+            out[p, KIND] = FLAT
+            return p + 1
+        fd = fg * gd
+        fdd = fgg * gd * gd + fg * gdd
+        v, vd, vdd = v * f, vd * f + v * fd, vdd * f + 2.0 * vd * fd + v * fdd
+        x += span
+    return p + 1  # not reached: the head always returns
+
+
+@njit(cache=True)
+def piece_at(x: float, pieces: Array, count: int) -> int:
+    """Index of the piece that holds x, the right-hand one at a junction (kernel)."""
+    i = count - 1
+    while i > 0 and x < pieces[i, START]:
+        i -= 1
+    return i
+
+
+@njit(cache=True)
+def piece_jet(x: float, piece: Array, omega: float) -> tuple[float, float, float, float, float, float]:
+    """y, y_x, y_xx, y_t, y_xt, y_tt of one piece at x (kernel)."""
+    if piece[KIND] == FLAT:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    v, vd, vdd = piece[V], piece[VD], piece[VDD]
+    if piece[KIND] == TAIL:
+        X = omega * (x - piece[ORIGIN])
+        s, c = sin(X), omega * cos(X)
+        return v * s, v * c, -omega * omega * v * s, vd * s, vd * c, vdd * s
+    gd, gdd = piece[GD], piece[GDD]
+    f, fx, fxx, fg, fxg, fgg = dynamic_jet(x - piece[ORIGIN], piece[G], omega)
+    return (
+        v * f,
+        v * fx,
+        v * fxx,
+        vd * f + v * fg * gd,
+        vd * fx + v * fxg * gd,
+        vdd * f + 2.0 * vd * fg * gd + v * (fgg * gd * gd + fg * gdd),
+    )
+
+
+@njit(cache=True)
+def piece_value(x: float, piece: Array, omega: float) -> tuple[float, float, float]:
+    """y, y_x, y_xx of one piece at x (kernel)."""
+    if piece[KIND] == FLAT:
+        return 0.0, 0.0, 0.0
+    v = piece[V]
+    if piece[KIND] == TAIL:
+        X = omega * (x - piece[ORIGIN])
+        s = v * sin(X)
+        return s, v * omega * cos(X), -omega * omega * s
+    f, fx, fxx = dynamic_value(x - piece[ORIGIN], piece[G], omega)
+    return v * f, v * fx, v * fxx
+
+
+@njit(cache=True)
+def evaluate(x: Array, pieces: Array, counts: Array, omega: float, y: Array, slope: Array) -> None:
+    """y and slope (B, S) of B curves at x (B, S) (kernel)."""
+    for b in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            k = piece_at(x[b, i], pieces[b], counts[b])
+            y[b, i], slope[b, i], _ = piece_value(x[b, i], pieces[b, k], omega)
+
+
+@njit(cache=True)
+def build_batch(
+    tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array, counts: Array
+) -> None:
+    """:func:`build_pieces` for B curves without rates: tail (B,), gammas (B, N_B + 1) (kernel)."""
+    t = np.zeros(3)
+    g = np.zeros((gammas.shape[1], 3))
+    for b in range(tail.size):
+        t[0] = tail[b]
+        g[:, 0] = gammas[b]
+        counts[b] = build_pieces(t, g, omega, crossing, rule, lead, out[b])
+
+
+@njit(cache=True)
+def arc_between(a: float, b: float, pieces: Array, count: int, omega: float, nodes: Array, weights: Array) -> float:
+    """Arc length from x = a to x = b >= a, Gauss-Legendre in steps of at most a quarter radian of the wave (kernel)."""
+    total = 0.0
+    k = piece_at(a, pieces, count)
+    x = a
+    while x < b:
+        end = b
+        if k + 1 < count and pieces[k + 1, START] < end:
+            end = pieces[k + 1, START]
+        if pieces[k, KIND] == FLAT:
+            total += end - x
+        elif end > x:
+            steps = int((end - x) * omega * 4.0) + 1
+            h = (end - x) / steps
+            for j in range(steps):
+                for m in range(nodes.size):
+                    at = x + h * (j + nodes[m])
+                    slope = piece_value(at, pieces[k], omega)[1]
+                    total += weights[m] * h * sqrt(1.0 + slope * slope)
+        x = end
+        k += 1
+    return total

@@ -1,0 +1,291 @@
+"""Straight links on a planar curve by circles (paper *concertina*, section V), certified and differentiated.
+
+Joint i + 1 is where a circle of the link's length about joint i meets the curve **first, going ahead along it**.
+The search cannot step over that point: with K a bound of the second derivative of the squared distance ahead,
+the parabola through the present value and slope with curvature K stays above the function, so its root is a safe
+step, and near the answer it is Newton's (quadratic) step. A bare secant, as in the paper, diverges or runs
+backwards once omega is large against the link (95 of 854 links at omega = 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import atan2, pi, sqrt
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array, IntArray, TextArray, finite, number, whole
+from bodyplan.curves import pieces as pc
+from bodyplan.curves.concertina import GAUSS_NODES, GAUSS_WEIGHTS, ConcertinaCurve
+from bodyplan.errors import InputError, SolveError, Status
+
+#: a link whose curve is longer than this many link lengths (half a circle over the link) skips a fold
+TIGHT_ARC = 0.5 * pi
+
+
+@dataclass(frozen=True)
+class LinksFit:
+    """Links fitted to a curve; unpacks as ``points, angles``.
+
+    ``points`` (..., n + 1, 2) joints from the start on, curve units. ``angles`` (..., n) absolute angles of the links,
+    rad, in (-pi/2, pi/2]. ``status`` (...): "ok", or "too_tight" where the curve between two joints is longer than
+    half a circle over the link, so that the link cuts across a fold; ``link`` (...) the first such link, else -1.
+    """
+
+    points: Array
+    angles: Array
+    status: TextArray | str
+    link: IntArray | int
+
+    def __iter__(self) -> Iterator[Array]:
+        return iter((self.points, self.angles))
+
+    @property
+    def ok(self) -> bool:
+        """True where every link of every curve fits."""
+        return bool(np.all(np.asarray(self.status) == Status.OK.value))
+
+    def raise_if_failed(self) -> LinksFit:
+        """This fit, or SolveError naming the first link that is too long for the curve."""
+        if not self.ok:
+            which = int(np.flatnonzero(np.asarray(self.status).ravel() != Status.OK.value)[0])
+            link = int(np.asarray(self.link).ravel()[which])
+            raise SolveError(
+                Status.TOO_TIGHT, f"the curve folds under link {link + 1}: use shorter links or a smaller omega", link
+            )
+        return self
+
+
+@njit(cache=True)
+def _bounds(piece: Array, omega: float, y: float, slope: float) -> tuple[float, float]:
+    """Bounds of |y'| and |y''| on the rest of a piece, from a point with the given y and slope on."""
+    if piece[pc.KIND] == pc.FLAT:
+        return 0.0, 0.0
+    # F'' + 2 g w F' + w^2 F = 0 loses energy (the tail's sine keeps it), so |(F', w F)| never grows
+    energy = sqrt(slope * slope + omega * omega * y * y)
+    return energy, energy * omega * sqrt(1.0 + 4.0 * piece[pc.G] * piece[pc.G])
+
+
+@njit(cache=True)
+def next_joint(x0: float, y0: float, k: int, length: float, pieces: Array, count: int, omega: float) -> float:
+    """x of the first point ahead of (x0, y0), which lies on piece k, at distance ``length`` (kernel)."""
+    x = x0
+    reach = x0 + length  # the distance is at least x - x0, so the answer is not beyond
+    while True:
+        end = reach
+        if k + 1 < count and pieces[k + 1, pc.START] < end:
+            end = pieces[k + 1, pc.START]
+        y, slope, _ = pc.piece_value(x, pieces[k], omega)
+        m1, m2 = _bounds(pieces[k], omega, y, slope)
+        bound = 2.0 + 2.0 * m1 * m1 + 2.0 * length * m2
+        while True:
+            dx, dy = x - x0, y - y0
+            g = (dx - length) * (dx + length) + dy * dy
+            if g >= 0.0:
+                return x
+            g1 = 2.0 * (dx + dy * slope)
+            root = sqrt(g1 * g1 - 2.0 * bound * g)
+            # the smaller root of g + g1 h + bound h^2 / 2, without cancellation
+            step = (root - g1) / bound if g1 < 0.0 else -2.0 * g / (root + g1)
+            if x + step >= end:
+                break
+            if step <= 2e-16 * length or x + step == x:
+                return x
+            x += step
+            y, slope, _ = pc.piece_value(x, pieces[k], omega)
+        if end == reach:
+            # only a level link reaches so far, and rounding may put it past the last piece's own answer
+            return reach
+        x = end
+        k += 1
+
+
+@njit(cache=True)
+def _tight(
+    a: float, b: float, y: float, k: int, length: float, pieces: Array, count: int, omega: float, nodes: Array,
+    weights: Array,
+) -> bool:
+    """True where the arc from x = a to b is longer than TIGHT_ARC links; integrates only where a bound leaves doubt."""
+    steepest = 0.0
+    x = a
+    while k < count and x <= b:
+        y, slope, _ = pc.piece_value(x, pieces[k], omega)
+        steepest = max(steepest, _bounds(pieces[k], omega, y, slope)[0])
+        k += 1
+        if k < count:
+            x = pieces[k, pc.START]
+    if (b - a) * sqrt(1.0 + steepest * steepest) <= TIGHT_ARC * length:
+        return False
+    return pc.arc_between(a, b, pieces, count, omega, nodes, weights) > TIGHT_ARC * length
+
+
+@njit(cache=True)
+def fit_chain(
+    lengths: Array,
+    start: float,
+    pieces: Array,
+    count: int,
+    omega: float,
+    nodes: Array,
+    weights: Array,
+    points: Array,
+    angles: Array,
+    rates: Array,
+) -> int:
+    """One chain on one curve (kernel). Fills points (n+1, 2), angles (n,), rates (2, n): first and second
+    derivative of the angles with respect to the curve's progress t. Returns the first link too tight, or -1."""
+    x = start
+    k = pc.piece_at(x, pieces, count)
+    y, yx, yxx, yt, yxt, ytt = pc.piece_jet(x, pieces[k], omega)
+    # the start stands still in x: only the curve moves under it
+    xd, xdd = 0.0, 0.0
+    yd, ydd = yt, ytt
+    points[0, 0], points[0, 1] = x, y
+    tight = -1
+    for i in range(lengths.size):
+        length = lengths[i]
+        before = k
+        xn = next_joint(x, y, k, length, pieces, count, omega)
+        k = pc.piece_at(xn, pieces, count)
+        yn, yx, yxx, yt, yxt, ytt = pc.piece_jet(xn, pieces[k], omega)
+        ux, uy = xn - x, yn - y
+        angles[i] = atan2(uy, ux)
+        # u . u' = 0 along t, twice: the new joint's speed and acceleration along x
+        across = ux + uy * yx
+        xnd = (ux * xd + uy * (yd - yt)) / across
+        ynd = yx * xnd + yt
+        vx, vy = xnd - xd, ynd - yd
+        bend = yxx * xnd * xnd + 2.0 * yxt * xnd + ytt
+        xndd = (ux * xdd + uy * (ydd - bend) - vx * vx - vy * vy) / across
+        yndd = yx * xndd + bend
+        square = length * length
+        rates[0, i] = (ux * vy - uy * vx) / square
+        rates[1, i] = (ux * (yndd - ydd) - uy * (xndd - xdd)) / square
+        if tight < 0 and _tight(x, xn, y, before, length, pieces, count, omega, nodes, weights):
+            tight = i
+        x, y, xd, yd, xdd, ydd = xn, yn, xnd, ynd, xndd, yndd
+        points[i + 1, 0], points[i + 1, 1] = x, y
+    return tight
+
+
+@njit(cache=True)
+def _fit_batch(
+    lengths: Array,
+    start: Array,
+    pieces: Array,
+    counts: IntArray,
+    omega: float,
+    nodes: Array,
+    weights: Array,
+    points: Array,
+    angles: Array,
+    tight: IntArray,
+) -> None:
+    rates = np.empty((2, lengths.size))
+    for b in range(counts.size):
+        tight[b] = fit_chain(
+            lengths, start[b], pieces[b], counts[b], omega, nodes, weights, points[b], angles[b], rates
+        )
+
+
+def link_lengths(link_length: ArrayLike, links: int | None) -> Array:
+    """Link lengths (n,) from one length and a count, or from a sequence; InputError if they disagree."""
+    lengths = finite(link_length, "link_length")
+    if lengths.ndim > 1:
+        raise InputError(f"link_length: expected a number or a list of them, got shape {lengths.shape}.")
+    if lengths.ndim == 0:
+        if links is None:
+            raise InputError("links: say how many when link_length is one number.")
+        lengths = np.full(whole(links, "links", at_least=1), float(lengths))
+    elif links is not None and whole(links, "links", at_least=1) != lengths.size:
+        raise InputError(f"links: {links} links, but link_length lists {lengths.size}.")
+    if lengths.size == 0 or np.any(lengths <= 0.0):
+        raise InputError(f"link_length: every link must be longer than 0, got {lengths.min(initial=0.0)}.")
+    return np.ascontiguousarray(lengths)
+
+
+def links_on_curve(
+    curve: ConcertinaCurve, link_length: ArrayLike, links: int | None = None, start: ArrayLike = 0.0
+) -> LinksFit:
+    """Fit straight links to a curve by circles, each joint the nearest intersection ahead along the curve.
+
+    ``curve`` may be a batch; ``link_length`` one length (then ``links`` says how many) or a list of lengths, in
+    curve units; ``start`` x of the first joint, a number or one a curve. Points (..., n + 1, 2) lie on the curve
+    and are one link apart to 1e-12 or better. Returns a :class:`LinksFit`; a curve too tight for the links is its
+    status. Raises InputError for non-positive lengths or a start before the tail.
+    """
+    if not isinstance(curve, ConcertinaCurve):
+        raise InputError(f"curve: expected a ConcertinaCurve, got {type(curve).__name__}.")
+    lengths = link_lengths(link_length, links)
+    pieces, counts = curve.pieces
+    first = np.ascontiguousarray(np.broadcast_to(finite(start, "start"), curve.batch)).reshape(-1)
+    if np.any(first < 0.0):
+        raise InputError(f"start: the curve starts at its tail, x = 0, got {first.min()}.")
+    size = counts.size
+    points, angles = np.empty((size, lengths.size + 1, 2)), np.empty((size, lengths.size))
+    tight = np.empty(size, dtype=np.int64)
+    _fit_batch(
+        lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight
+    )
+    points, angles = points.reshape(*curve.batch, *points.shape[1:]), angles.reshape(*curve.batch, -1)
+    status = np.where(tight < 0, Status.OK.value, Status.TOO_TIGHT.value).reshape(curve.batch)
+    if not curve.batch:
+        return LinksFit(points, angles, str(status), int(tight[0]))
+    return LinksFit(points, angles, status, tight.reshape(curve.batch))
+
+
+class ExactLength(float):
+    """A link length that knows whether it exists: ``status`` "ok", "no_exact_length" (then the value is nan) or
+    "too_tight"; ``flat_from`` is the length of the contracted curve along x. Behaves as the float it is."""
+
+    status: str
+    flat_from: float
+
+    def __new__(cls, value: float, status: Status, flat_from: float) -> ExactLength:
+        out = super().__new__(cls, value)
+        out.status, out.flat_from = status.value, flat_from
+        return out
+
+    def raise_if_failed(self) -> ExactLength:
+        """This length, or SolveError."""
+        if self.status != Status.OK.value:
+            raise SolveError(self.status, "no link length puts the last joint exactly on the end of the contracted curve")
+        return self
+
+
+def exact_link_length(
+    links: int | ArrayLike, body_modules: int = 4, omega: float = 1.0, *, crossing: int = 2
+) -> ExactLength:
+    """Link length, in curve units, whose chain of ``links`` covers the contracted curve (all gamma 0) exactly.
+
+    The last joint then lies where the head's curve ends, on the axis. ``links`` may also be a list of relative link
+    lengths: the result is the factor that scales them. 0.873938881878 for 26 links, 4 modules, omega 1.
+    That such a length exists is not certain where links are long against the folds: then it is a status of the
+    result. Raises InputError for bad counts or omega.
+    """
+    from scipy.optimize import brentq
+
+    ratios = np.ones(whole(links, "links", at_least=1)) if np.ndim(links) == 0 else link_lengths(links, None)
+    modules = whole(body_modules, "body_modules", at_least=1)
+    number(omega, "omega", above=0.0)
+    curve = ConcertinaCurve(np.zeros(modules), 0.0, omega=omega, crossing=crossing)
+    end = curve.flat_from
+    if not np.isfinite(end):
+        return ExactLength(np.nan, Status.NO_EXACT_LENGTH, end)
+
+    def miss(scale: float) -> float:
+        return float(links_on_curve(curve, scale * ratios).points[-1, 0]) - end
+
+    # the chain is longer than its x extent and not longer than the curve
+    low, high = end / ratios.sum(), float(curve.arclength(end)) / ratios.sum()
+    grid = np.linspace(low, high, 129)
+    misses = np.array([miss(s) for s in grid])
+    for i in np.flatnonzero((misses[:-1] < 0.0) & (misses[1:] >= 0.0)):
+        scale = float(brentq(miss, grid[i], grid[i + 1], xtol=1e-15, rtol=8.9e-16))
+        if abs(miss(scale)) <= 1e-10 * end:  # else the chain jumps over the end: a fold was skipped
+            fit = links_on_curve(curve, scale * ratios)
+            return ExactLength(scale, Status.OK if fit.ok else Status.TOO_TIGHT, end)
+    return ExactLength(np.nan, Status.NO_EXACT_LENGTH, end)
