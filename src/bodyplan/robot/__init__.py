@@ -1,1 +1,21 @@
+"""Robots: D-H rows, arcs and drives; forward kinematics, velocity equation, Jacobians."""
 
+from bodyplan.robot.elements import Arc, Body, Chain, Contact, Joint, Row, WheelRadius
+from bodyplan.robot.library import snake
+from bodyplan.robot.model import Robot
+from bodyplan.robot.poses import Poses
+from bodyplan.robot.reach import Reach
+
+__all__ = [
+    "Arc",
+    "Body",
+    "Chain",
+    "Contact",
+    "Joint",
+    "Poses",
+    "Reach",
+    "Robot",
+    "Row",
+    "WheelRadius",
+    "snake",
+]

@@ -24,9 +24,16 @@ from bodyplan.errors import InputError
 
 
 def _named(value: object, field: str) -> str:
-    if not isinstance(value, str) or not value or value != value.strip() or any(c in value for c in "\n\t,/\"'"):
-        raise InputError(f"{field}: a name must be a non-empty text without spaces around it, commas, quotes or "
-                         f"slashes, got {value!r}.")
+    if (
+        not isinstance(value, str)
+        or not value
+        or value != value.strip()
+        or any(c in value for c in "\n\t,/\"'")
+    ):
+        raise InputError(
+            f"{field}: a name must be a non-empty text without spaces around it, commas, quotes or "
+            f"slashes, got {value!r}."
+        )
     return value
 
 
@@ -72,15 +79,22 @@ class Joint:
 
     def share(self, fraction: float) -> Joint:
         """The same joint driving with ``fraction`` of its motion (0.5: half of a double joint)."""
-        return Joint(self.name, self.offset * fraction, self.scale * fraction, self.limits, self.rate, self.effort,
-                     self.actuated)
+        return Joint(
+            self.name,
+            self.offset * fraction,
+            self.scale * fraction,
+            self.limits,
+            self.rate,
+            self.effort,
+            self.actuated,
+        )
 
 
 @dataclass(frozen=True)
 class WheelRadius:
     """Radius law of a three-legged wheel (paper *wheels*): ``link cos(q/2) cos(30 deg) + rubber``.
 
-    ``joint`` is the adjusting angle q (rad, in [0, pi] unless it has its own limits), ``link`` the leg
+    ``joint`` is the adjusting angle q (rad, in [0, pi] unless the joint has limits), ``link`` the leg
     length w and ``rubber`` the tread thickness R_ru in m. May drive a length (``d`` or ``a``) only.
     """
 
@@ -92,12 +106,11 @@ class WheelRadius:
         if not isinstance(self.joint, Joint):
             raise InputError(f"WheelRadius.joint: expected a Joint, got {self.joint!r}.")
         if (self.joint.offset, self.joint.scale) != (0.0, 1.0):
-            raise InputError("WheelRadius.joint: offset must be 0 and scale 1, the law takes the angle itself.")
+            raise InputError(
+                "WheelRadius.joint: offset must be 0 and scale 1, the law takes the angle itself."
+            )
         number(self.link, "WheelRadius.link", above=0.0)
         number(self.rubber, "WheelRadius.rubber", at_least=0.0)
-        if self.joint.limits is None:
-            object.__setattr__(self, "joint", Joint(self.joint.name, limits=(0.0, float(np.pi)), rate=self.joint.rate,
-                                                    effort=self.joint.effort, actuated=self.joint.actuated))
 
 
 Drive = Joint | WheelRadius
@@ -213,7 +226,9 @@ class Chain:
             raise InputError(f"chain {self.name!r}: has no rows.")
         for i, element in enumerate(self.elements):
             if not isinstance(element, (Row, Arc)):
-                raise InputError(f"chain {self.name!r}, element {i + 1}: expected a Row or an Arc, got {element!r}.")
+                raise InputError(
+                    f"chain {self.name!r}, element {i + 1}: expected a Row or an Arc, got {element!r}."
+                )
 
     def frame_name(self, index: int) -> str:
         """Name of the frame that element ``index`` (from 0) ends in."""

@@ -1,0 +1,280 @@
+"""The one model under every robot: a floating base and chains of D-H rows and arcs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array, frozen
+from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.robot import batch, describe
+from bodyplan.robot.assemble import assemble, declare
+from bodyplan.robot.elements import (
+    Arc,
+    Body,
+    Chain,
+    Contact,
+    Element,
+    Joint,
+    Row,
+    joint_kinds,
+    joint_properties,
+)
+from bodyplan.robot.kernels import forward_kernel
+from bodyplan.robot.poses import Poses
+from bodyplan.robot.reach import Reach, reach
+from bodyplan.robot.rows import arc_matrices, row_matrices
+from bodyplan.robot.tables import Paths, Tables, build_paths, build_tables
+
+
+@dataclass(frozen=True, repr=False)
+class Robot:
+    """A robot: a floating base and chains of elements; immutable, equal by value, its arrays read-only.
+
+    ``chains``: tuple of :class:`Chain`. ``contacts``: shapes on frames that may touch the ground.
+    ``base_body``: mass carried by the base. Joint coordinates are ordered chain by chain, element by element,
+    variable by variable (theta, d, a, epsilon; pitch, yaw), each joint where it first appears. Frames are
+    ``"base"`` and then the end of every element in chain order.
+
+    Raises InputError or UnknownNameError: names used twice, reserved names, a parent that is not a frame of an
+    earlier chain, a contact on a frame that does not exist, a joint described in contradictory ways.
+    """
+
+    name: str
+    chains: tuple[Chain, ...]
+    contacts: tuple[Contact, ...] = ()
+    base_body: Body | None = None
+
+    def __post_init__(self) -> None:
+        chains, contacts = assemble(self.name, self.chains, self.contacts, self.base_body)
+        object.__setattr__(self, "chains", chains)
+        object.__setattr__(self, "contacts", contacts)
+
+    @classmethod
+    def from_rows(
+        cls,
+        rows: Mapping[str, Sequence[Row | Arc]],
+        *,
+        parents: Mapping[str, str] | None = None,
+        contacts: Sequence[Contact] = (),
+        base_body: Body | None = None,
+        name: str = "robot",
+        joints: Sequence[Joint | str] | None = None,
+    ) -> Robot:
+        """A robot from lists of elements by chain name.
+
+        ``parents``: the frame a chain starts from, ``"base"`` where not given. ``joints`` declares the joints
+        (names, or :class:`Joint` with limits, rate, effort, actuated): every joint used must then be
+        declared, and a declared joint must drive something.
+        """
+        if not isinstance(rows, Mapping):
+            raise InputError(f"rows: expected a mapping from chain name to rows, got {type(rows).__name__}.")
+        parents = dict(parents or {})
+        for chain in parents:
+            if chain not in rows:
+                raise UnknownNameError("chain", chain, rows, where="parents")
+        chains = tuple(
+            Chain(chain, tuple(items), parents.get(chain, "base")) for chain, items in rows.items()
+        )
+        if joints is not None:
+            chains = declare(chains, joints)
+        return cls(name, chains, tuple(contacts), base_body)
+
+    # --- names and properties -------------------------------------------------------------------------------
+
+    @cached_property
+    def _joints(self) -> dict[str, Joint]:
+        return dict(joint_properties(self.chains))
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the n joint coordinates, in the order of the columns of q."""
+        return tuple(self._joints)
+
+    @property
+    def n(self) -> int:
+        """Number of joint coordinates."""
+        return len(self.joints)
+
+    @cached_property
+    def joint_info(self) -> tuple[Joint, ...]:
+        """Properties of every joint (offset 0, scale 1)."""
+        return tuple(self._joints.values())
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """ "angle" (rad) or "length" (m) for every joint."""
+        return tuple(joint_kinds(self.chains).values())
+
+    @cached_property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the F frames: "base", then the end of every element in chain order."""
+        return ("base", *(chain.frame_name(i) for chain in self.chains for i in range(len(chain.elements))))
+
+    @cached_property
+    def ends(self) -> tuple[int, ...]:
+        """Index in ``frames`` of the last frame of every chain."""
+        return tuple(int(i) for i in np.cumsum([len(chain.elements) for chain in self.chains]))
+
+    @cached_property
+    def elements(self) -> tuple[Element, ...]:
+        """All elements; the one at index i ends in frame i + 1."""
+        return tuple(element for chain in self.chains for element in chain.elements)
+
+    @cached_property
+    def limits(self) -> Array:
+        """(n, 2) lowest and highest q, rad or m; -inf and inf where there is none."""
+        return frozen(np.reshape([j.limits or (-np.inf, np.inf) for j in self.joint_info], (-1, 2)))
+
+    @cached_property
+    def rates(self) -> Array:
+        """(n,) largest |dq/dt|, rad/s or m/s; inf where there is none."""
+        return frozen([np.inf if j.rate is None else j.rate for j in self.joint_info])
+
+    @cached_property
+    def efforts(self) -> Array:
+        """(n,) largest actuator torque N m or force N; inf where there is none."""
+        return frozen([np.inf if j.effort is None else j.effort for j in self.joint_info])
+
+    @cached_property
+    def actuated(self) -> Any:
+        """(n,) True where the joint has an actuator."""
+        out = np.array([j.actuated for j in self.joint_info], dtype=bool)
+        out.flags.writeable = False
+        return out
+
+    @cached_property
+    def mass(self) -> float:
+        """Total mass of all bodies, kg."""
+        bodies = [self.base_body, *(element.body for element in self.elements)]
+        return float(sum(body.mass for body in bodies if body is not None))
+
+    @cached_property
+    def _frame_of(self) -> dict[str, int]:
+        index = {name: i for i, name in enumerate(self.frames)}
+        return index | {chain.name: end for chain, end in zip(self.chains, self.ends, strict=True)}
+
+    def frame_index(self, name: str) -> int:
+        """Index in ``frames`` of a frame, or of the end frame of a chain; UnknownNameError otherwise."""
+        if name not in self._frame_of:
+            raise UnknownNameError("frame", name, self._frame_of)
+        return self._frame_of[name]
+
+    def joint_index(self, name: str) -> int:
+        """Column of a joint in q; UnknownNameError otherwise."""
+        if name not in self._joints:
+            raise UnknownNameError("joint", name, self.joints)
+        return self.joints.index(name)
+
+    # --- kinematics -----------------------------------------------------------------------------------------
+
+    def vector(self, q: ArrayLike | Mapping[str, ArrayLike]) -> Array:
+        """Joint coordinates as an array (..., n): from such an array, or from a mapping of every joint name to
+        values that broadcast. InputError where the shape is wrong, a joint is missing or a value not finite."""
+        return batch.joint_array(q, self.joints)
+
+    def forward(self, q: ArrayLike | Mapping[str, ArrayLike], base: ArrayLike | None = None) -> Poses:
+        """Poses (..., F, 7) of every frame, "base" first.
+
+        ``q`` (..., n) rad or m; ``base`` (..., 7) pose of the base in the world (position m, unit quaternion
+        wxyz), broadcast against ``q``; the identity when None.
+        """
+        shape, flat, pose = batch.flatten(self.vector(q), base)
+        out = np.empty((len(flat), len(self.frames), 7))
+        batch.raise_if_bad(forward_kernel(flat, pose, *self._tables, out))
+        return Poses(out.reshape(*shape, len(self.frames), 7), self.frames, self._frame_of)
+
+    def velocity_model(self, q: ArrayLike | Mapping[str, ArrayLike]) -> tuple[Array, Array]:
+        """(P (..., 6m, 6), Q (..., 6m, n)) of paper *legs* eq. (9) for the m chain ends.
+
+        Body-fixed twists (v, omega): ``V_ends = P V_base + Q dq/dt``, six rows a chain in chain order, each in
+        the axes of that end frame, V_base in those of the base. P = D_n ... D_1 per chain (the paper prints the
+        opposite order). A chain that hangs on another has the columns of its parent's joints as well.
+        """
+        at = self.ends_and_jacobians(q)
+        return at.carried(), at.stacked(self.n)
+
+    def jacobian(
+        self, q: ArrayLike | Mapping[str, ArrayLike], frame: str, *, reference: str = "body"
+    ) -> Array:
+        """(..., 6, n) twist (v, omega) of ``frame`` per unit joint rate, for a base at rest.
+
+        ``reference``: "body", in the axes of the frame (the rows of Q); "world", the same twist in the axes of
+        the base (v is still the velocity of the frame's origin). A chain name stands for its end frame.
+        """
+        if reference not in ("body", "world"):
+            raise InputError(f"reference: must be 'body' or 'world', got {reference!r}.")
+        at = self.ends_and_jacobians(q, frames=(frame,))
+        J = at.stacked(self.n)
+        if reference == "world":
+            R = at.rotations[..., 0, :, :]
+            J = np.concatenate([R @ J[..., :3, :], R @ J[..., 3:, :]], axis=-2)
+        return J
+
+    def ends_and_jacobians(
+        self,
+        q: ArrayLike | Mapping[str, ArrayLike],
+        base: ArrayLike | None = None,
+        *,
+        frames: Sequence[str] | None = None,
+    ) -> Reach:
+        """Poses and compact body-fixed Jacobians of the chain ends (or of ``frames``) in one pass: the fast way.
+
+        See :class:`Reach` for the layout. ``base`` as in :meth:`forward`.
+        """
+        targets = self.ends if frames is None else tuple(self.frame_index(frame) for frame in frames)
+        return reach(self._tables, self._paths(targets), self.vector(q), base)
+
+    def element_matrices(self, q: ArrayLike | Mapping[str, ArrayLike], frame: str) -> tuple[Array, Array]:
+        """(D (..., 6, 6), E (..., 6, 4 or 2)) of the element that ends in ``frame``: paper *legs* eqs. (2)-(4),
+        columns of E for theta, d, a, epsilon of a row; pitch, yaw of an arc."""
+        index = self.frame_index(frame)
+        if index == 0:
+            raise InputError("frame: no element ends in 'base'.")
+        element, q = self.elements[index - 1], self.vector(q)
+        values = [batch.variable(getattr(element, field), q, self._column) for field in element.VARIABLES]
+        return arc_matrices(element.length, *values) if isinstance(element, Arc) else row_matrices(*values)
+
+    @cached_property
+    def _column(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.joints)}
+
+    @cached_property
+    def _tables(self) -> Tables:
+        return build_tables(self.chains, self.frames, self._column)
+
+    @cached_property
+    def _path_cache(self) -> dict[tuple[int, ...], Paths]:
+        return {}
+
+    def _paths(self, targets: tuple[int, ...]) -> Paths:
+        if targets not in self._path_cache:
+            self._path_cache[targets] = build_paths(self._tables, targets)
+        return self._path_cache[targets]
+
+    # --- as data --------------------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able description; :meth:`from_dict` gives an equal robot back."""
+        return describe.robot_to_dict(self.name, self.chains, self.joint_info, self.contacts, self.base_body)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Robot:
+        """The robot that :meth:`to_dict` described; InputError naming the field that is wrong."""
+        return cls(*describe.robot_from_dict(data))
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.name, self.chains, self.contacts, self.base_body)
+
+    def __repr__(self) -> str:
+        passive = self.n - int(self.actuated.sum())
+        return (
+            f"Robot({self.name!r}: {len(self.chains)} chain{'s' * (len(self.chains) != 1)}, "
+            f"{len(self.frames)} frames, {self.n} joints{f' ({passive} passive)' if passive else ''}, "
+            f"{len(self.contacts)} contacts, {self.mass:.3g} kg)"
+        )
