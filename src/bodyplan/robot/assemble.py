@@ -47,7 +47,7 @@ def assemble(
             raise UnknownNameError("frame", contact.frame, frames, where=f"Contact({contact.name!r}).frame")
         if contact.frame not in frames:
             raise InputError(
-                f"Contact({contact.name!r}).frame: {contact.frame!r} is a chain; name its frame, for example its end."
+                f"Contact({contact.name!r}).frame: {contact.frame!r} is a chain; name one of its frames."
             )
     joints = dict(joint_properties(chains))
     for name in _wheel_joints(chains):
@@ -152,7 +152,7 @@ def _check_names(chains: tuple[Chain, ...]) -> None:
                 owner[frame] = chain.name
     for name in chain_names & owner.keys():
         raise InputError(
-            f"chain {name!r}: frame {name!r} of chain {owner[name]!r} has the same name and is not the chain's end."
+            f"chain {name!r}: frame {name!r} of chain {owner[name]!r} has the same name and is not its end."
         )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from bodyplan.arrays import number
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.assemble import declare
-from bodyplan.robot.drive_text import quantity, variable
+from bodyplan.robot.drive_text import located, quantity, variable
 from bodyplan.robot.elements import Arc, Body, Chain, Contact, Element, Joint, Row, WheelRadius, joint_kinds
 
 Parts = tuple[str, tuple[Chain, ...], tuple[Contact, ...], Body | None]
@@ -19,8 +19,8 @@ Parts = tuple[str, tuple[Chain, ...], tuple[Contact, ...], Body | None]
 _DIMENSIONS = {"mass": "mass", "friction": "none"} | dict.fromkeys(
     ("com", "start", "end", "half", "radius"), "length"
 )
-_RATES = {"angle": "angular_rate", "length": "speed"}
-_EFFORTS = {"angle": "torque", "length": "force"}
+RATES = {"angle": "angular_rate", "length": "speed"}
+EFFORTS = {"angle": "torque", "length": "force"}
 
 
 def robot_to_dict(
@@ -30,8 +30,8 @@ def robot_to_dict(
     contacts: Sequence[Contact],
     base_body: Body | None,
 ) -> dict[str, Any]:
-    """Plain data of a robot: ``name``, ``joints``, ``chains`` with ``elements``, ``contacts``, ``base_body``. What is
-    None is left out; an infinite limit is the text "inf" or "-inf"."""
+    """Plain data of a robot: ``name``, ``joints``, ``chains`` with ``elements``, ``contacts``, ``base_body``.
+    What is None is left out; an infinite limit is the text "inf" or "-inf"."""
     out: dict[str, Any] = {
         "name": name,
         "joints": [_plain(joint, skip=("offset", "scale")) for joint in joints],
@@ -51,8 +51,8 @@ def robot_to_dict(
 
 
 def robot_from_dict(data: Any) -> Parts:
-    """Arguments of Robot from plain data: that of :func:`robot_to_dict`, or written by hand with quantities and
-    drives as text (:mod:`bodyplan.robot.drive_text`) and what is at its default left out.
+    """Arguments of Robot from plain data: that of :func:`robot_to_dict`, or written by hand with quantities
+    and drives as text (:mod:`bodyplan.robot.drive_text`) and what is at its default left out.
 
     Raises InputError naming the entry, such as ``chains[2].elements[0].theta``, that is wrong.
     """
@@ -156,7 +156,7 @@ def _joint(data: Any, where: str, kinds: Mapping[str, str]) -> Joint | str:
         known["limits"] = tuple(
             _limit(v, kind, f"{where}.limits") for v in _items(known["limits"], f"{where}.limits")
         )
-    for field, dimension in (("rate", _RATES[kind]), ("effort", _EFFORTS[kind])):
+    for field, dimension in (("rate", RATES[kind]), ("effort", EFFORTS[kind])):
         if field in known:
             known[field] = quantity(known[field], dimension, f"{where}.{field}")
     if not isinstance(known.get("actuated", True), bool):
@@ -183,9 +183,8 @@ def _made(make: type[Any], data: Any, where: str) -> Any:
 
 def _build(make: type[Any], known: Mapping[str, Any], where: str) -> Any:
     try:
-        return make(**known)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+        with located(where):
+            return make(**known)
     except TypeError as error:
         missing = [
             field.name for field in fields(make) if field.name not in known and field.default is MISSING

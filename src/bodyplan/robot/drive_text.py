@@ -1,14 +1,15 @@
-"""Variables of an element written as text: ``"90 deg"``, ``"fl.knee"``, ``"0.5*j3 - 0.1"``, ``"90 deg - fl.hip"``.
+"""Variables of an element written as text: ``"90 deg"``, ``"knee"``, ``"0.5*j3 - 0.1"``, ``"90 deg - hip"``.
 
-One sum of terms separated by ``+`` or ``-`` with spaces around them (a joint name may hold a hyphen). One term
-at most names a joint, optionally with a factor: ``j``, ``-j``, ``0.5*j``, ``j*0.5``, ``j/2``. The others are
-quantities: a number, with or without a unit.
+One sum of terms separated by ``+`` or ``-`` with spaces around them (a joint name may hold a hyphen). One
+term at most names a joint, optionally with a factor: ``j``, ``-j``, ``0.5*j``, ``j*0.5``, ``j/2``. The others
+are quantities: a number, with or without a unit.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from bodyplan.arrays import number
@@ -17,11 +18,13 @@ from bodyplan.robot.elements import Joint, Variable, WheelRadius
 from bodyplan.units import SI_UNITS, to_si
 
 MAX_TEXT = 200
+_EXAMPLE = {"angle": "'90 deg'", "length": "'25 mm'"}
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"([+-]?{_NUMBER})\s*([A-Za-zµ°][A-Za-zµ°0-9/*^ ]{{0,30}})?")
 _NAME = r"[^\W\d][\w.:\-]*"
 _JOINT = re.compile(
-    rf"(?P<minus>-)?\s*(?:(?P<before>{_NUMBER})\s*\*\s*)?(?P<name>{_NAME})(?:\s*(?P<how>[*/])\s*(?P<after>{_NUMBER}))?"
+    rf"(?P<minus>-)?\s*(?:(?P<before>{_NUMBER})\s*\*\s*)?(?P<name>{_NAME})"
+    rf"(?:\s*(?P<how>[*/])\s*(?P<after>{_NUMBER}))?"
 )
 
 
@@ -62,8 +65,8 @@ def variable(value: Any, dimension: str, where: str, unit: str | None = None) ->
         found = _JOINT.fullmatch(term)
         if not found or joint is not None:
             raise InputError(
-                f"{where}: {value!r} is neither a {dimension} such as '90 deg' or '25 mm' nor one joint with a factor "
-                "and an offset such as 'knee', '0.5*knee', 'knee + 90 deg' (spaces around + and -)."
+                f"{where}: {value!r} is neither a {dimension} such as {_EXAMPLE[dimension]} nor one joint with "
+                "a factor and an offset such as 'knee', '0.5*knee', 'knee + 0.1' (spaces around + and -)."
             )
         scale = sign * (-1.0 if found["minus"] else 1.0) * float(found["before"] or 1.0)
         if found["after"]:
@@ -71,7 +74,8 @@ def variable(value: Any, dimension: str, where: str, unit: str | None = None) ->
             if found["how"] == "/" and after == 0.0:
                 raise InputError(f"{where}: {value!r} divides by 0.")
             scale = scale * after if found["how"] == "*" else scale / after
-        joint = _guarded(where, lambda s=scale, name=found["name"]: Joint(name, 0.0, s))
+        with located(where):
+            joint = Joint(found["name"], 0.0, scale)
     if joint is None:
         return offset
     return Joint(joint.name, offset, joint.scale)
@@ -90,19 +94,24 @@ def _from_mapping(value: Mapping[str, Any], dimension: str, where: str) -> Varia
             raise UnknownNameError("field", key, valid, where=where)
     if valid[0] not in value or (valid[0] == "wheel_radius" and "link" not in value):
         raise InputError(
-            f"{where}: a drive needs {{joint = name}} or {{wheel_radius = name, link = length}}, got {value!r}."
+            f"{where}: a drive needs joint = name, or wheel_radius = name and link = length, got {value!r}."
         )
     if valid[0] == "wheel_radius":
         link = quantity(value["link"], "length", f"{where}.link")
         rubber = quantity(value.get("rubber", 0.0), "length", f"{where}.rubber")
-        return _guarded(where, lambda: WheelRadius(Joint(value["wheel_radius"]), link, rubber))
+        with located(where):
+            return WheelRadius(Joint(value["wheel_radius"]), link, rubber)
     offset = quantity(value.get("offset", 0.0), dimension, f"{where}.offset")
     scale = number(value.get("scale", 1.0), f"{where}.scale")
-    return _guarded(where, lambda: Joint(value["joint"], offset, scale))
+    with located(where):
+        return Joint(value["joint"], offset, scale)
 
 
-def _guarded(where: str, make: Any) -> Any:
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Put ``where`` before the message of an InputError that leaves the block."""
     try:
-        return make()
+        yield
     except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+        error.args = (f"{where}: {error}",)
+        raise

@@ -13,7 +13,7 @@ named joint coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -40,10 +40,13 @@ def _named(value: object, field: str) -> str:
 def _interval(value: Any, field: str) -> tuple[float, float] | None:
     if value is None:
         return None
-    low, high = np.asarray(value, dtype=np.float64).reshape(-1) if np.size(value) == 2 else (1.0, 0.0)
+    try:
+        low, high = (float(v) for v in value)
+    except (TypeError, ValueError):
+        low, high = 1.0, 0.0
     if not low < high:
         raise InputError(f"{field}: must be (low, high) with low < high, got {value!r}.")
-    return float(low), float(high)
+    return low, high
 
 
 @dataclass(frozen=True)
@@ -213,7 +216,7 @@ def _check_element(element: Element, kind: str) -> None:
 
 @dataclass(frozen=True)
 class Chain:
-    """A named sequence of elements that starts at the ``parent`` frame: ``"base"`` or a frame of an earlier chain."""
+    """A named sequence of elements from the ``parent`` frame on: ``"base"`` or a frame of an earlier chain."""
 
     name: str
     elements: tuple[Element, ...]
@@ -221,6 +224,9 @@ class Chain:
 
     def __post_init__(self) -> None:
         _named(self.name, "Chain.name")
+        _named(self.parent, f"chain {self.name!r}.parent")
+        if isinstance(self.elements, (Row, Arc)) or not isinstance(self.elements, Iterable):
+            raise InputError(f"chain {self.name!r}: expected a sequence of elements, got {self.elements!r}.")
         object.__setattr__(self, "elements", tuple(self.elements))
         if not self.elements:
             raise InputError(f"chain {self.name!r}: has no rows.")

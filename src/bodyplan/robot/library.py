@@ -37,16 +37,16 @@ def snake(
     The base is the rear end of link 1, x along it, z up; every link frame has x along its link and is upright
     at zero angles. ``link_length`` in m: one number, or one a link.
 
-    ``joint="straight"``: rigid links; joint i turns between links i and i + 1, so N - 1 bends. ``"arc"``: every
-    link is itself a bending segment of constant curvature (paper *acm*), joint i bends link i, N bends.
+    ``joint="straight"``: rigid links; joint i turns between links i and i + 1, so N - 1 bends. ``"arc"``:
+    every link is itself a bending segment of constant curvature (paper *acm*), joint i bends link i, N bends.
 
     ``axes``: "yaw" (about z; joints "yaw1", ...), "pitch" (right-handed about y, nose down; "pitch1", ...),
-    "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...; paper *acm*), "universal" (at every joint
-    yaw, then pitch: "yaw1", "pitch1", ...).
+    "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...; paper *acm*), "universal" (at every
+    joint yaw, then pitch: "yaw1", "pitch1", ...).
 
-    ``radius`` m of the round body (default 0.3 of the mean link length). ``mass`` kg of one link (default: the volume of
-    its capsule at 1000 kg/m^3), at the middle of the link. ``limits`` (low, high) rad, ``rate`` rad/s and
-    ``effort`` N m for every joint. ``friction``: Coulomb coefficient of the belly.
+    ``radius`` m of the round body (default 0.3 of the mean link length). ``mass`` kg of one link (default: the
+    volume of its capsule at 1000 kg/m^3), at the middle of the link. ``limits`` (low, high) rad, ``rate``
+    rad/s and ``effort`` N m for every joint. ``friction``: Coulomb coefficient of the belly.
 
     Contacts, one a link and named like it: a straight link is a capsule over its whole length. A bending link
     is a sphere at its front end: that point is on the body's centre line at every bend.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, frozen
 from bodyplan.errors import InputError, UnknownNameError
-from bodyplan.robot import batch, describe
+from bodyplan.robot import batch, describe, files
 from bodyplan.robot.assemble import assemble, declare
+from bodyplan.robot.drive_text import located
 from bodyplan.robot.elements import (
     Arc,
     Body,
@@ -41,8 +43,8 @@ class Robot:
     variable by variable (theta, d, a, epsilon; pitch, yaw), each joint where it first appears. Frames are
     ``"base"`` and then the end of every element in chain order.
 
-    Raises InputError or UnknownNameError: names used twice, reserved names, a parent that is not a frame of an
-    earlier chain, a contact on a frame that does not exist, a joint described in contradictory ways.
+    Raises InputError or UnknownNameError: names used twice, reserved names, a parent that is not a frame of
+    an earlier chain, a contact on a frame that does not exist, a joint described in contradictory ways.
     """
 
     name: str
@@ -174,8 +176,9 @@ class Robot:
     # --- kinematics -----------------------------------------------------------------------------------------
 
     def vector(self, q: ArrayLike | Mapping[str, ArrayLike]) -> Array:
-        """Joint coordinates as an array (..., n): from such an array, or from a mapping of every joint name to
-        values that broadcast. InputError where the shape is wrong, a joint is missing or a value not finite."""
+        """Joint coordinates as an array (..., n): from such an array, or from a mapping of every joint name
+        to values that broadcast. InputError where the shape is wrong, a joint is missing or a value is not
+        finite, UnknownNameError for a name that is no joint."""
         return batch.joint_array(q, self.joints)
 
     def forward(self, q: ArrayLike | Mapping[str, ArrayLike], base: ArrayLike | None = None) -> Poses:
@@ -192,9 +195,9 @@ class Robot:
     def velocity_model(self, q: ArrayLike | Mapping[str, ArrayLike]) -> tuple[Array, Array]:
         """(P (..., 6m, 6), Q (..., 6m, n)) of paper *legs* eq. (9) for the m chain ends.
 
-        Body-fixed twists (v, omega): ``V_ends = P V_base + Q dq/dt``, six rows a chain in chain order, each in
-        the axes of that end frame, V_base in those of the base. P = D_n ... D_1 per chain (the paper prints the
-        opposite order). A chain that hangs on another has the columns of its parent's joints as well.
+        Body-fixed twists (v, omega): ``V_ends = P V_base + Q dq/dt``, six rows a chain in chain order, each
+        in the axes of that end frame, V_base in those of the base. P = D_n ... D_1 per chain (the paper
+        prints the opposite order). A chain that hangs on another has the columns of its parent's joints too.
         """
         at = self.ends_and_jacobians(q)
         return at.carried(), at.stacked(self.n)
@@ -204,8 +207,8 @@ class Robot:
     ) -> Array:
         """(..., 6, n) twist (v, omega) of ``frame`` per unit joint rate, for a base at rest.
 
-        ``reference``: "body", in the axes of the frame (the rows of Q); "world", the same twist in the axes of
-        the base (v is still the velocity of the frame's origin). A chain name stands for its end frame.
+        ``reference``: "body", in the axes of the frame (the rows of Q); "world", the same twist in the axes
+        of the base (v is still the velocity of the frame's origin). A chain name stands for its end frame.
         """
         if reference not in ("body", "world"):
             raise InputError(f"reference: must be 'body' or 'world', got {reference!r}.")
@@ -223,7 +226,7 @@ class Robot:
         *,
         frames: Sequence[str] | None = None,
     ) -> Reach:
-        """Poses and compact body-fixed Jacobians of the chain ends (or of ``frames``) in one pass: the fast way.
+        """Poses and compact body-fixed Jacobians of the chain ends (or ``frames``) in one pass: the fast way.
 
         See :class:`Reach` for the layout. ``base`` as in :meth:`forward`.
         """
@@ -231,8 +234,8 @@ class Robot:
         return reach(self._tables, self._paths(targets), self.vector(q), base)
 
     def element_matrices(self, q: ArrayLike | Mapping[str, ArrayLike], frame: str) -> tuple[Array, Array]:
-        """(D (..., 6, 6), E (..., 6, 4 or 2)) of the element that ends in ``frame``: paper *legs* eqs. (2)-(4),
-        columns of E for theta, d, a, epsilon of a row; pitch, yaw of an arc."""
+        """(D (..., 6, 6), E (..., 6, 4 or 2)) of the element that ends in ``frame``: paper *legs* eqs.
+        (2)-(4), columns of E for theta, d, a, epsilon of a row; pitch, yaw of an arc."""
         index = self.frame_index(frame)
         if index == 0:
             raise InputError("frame: no element ends in 'base'.")
@@ -267,6 +270,26 @@ class Robot:
     def from_dict(cls, data: Mapping[str, Any]) -> Robot:
         """The robot that :meth:`to_dict` described; InputError naming the field that is wrong."""
         return cls(*describe.robot_from_dict(data))
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Robot:
+        """The robot in a TOML file: fields as in :meth:`to_dict`; numbers may carry units ("240 mm") and
+        variables may be drives as text ("knee + 90 deg"). InputError names the file and the entry."""
+        return cls(*files.read_toml(path))
+
+    def to_toml(self, path: str | os.PathLike[str]) -> None:
+        """Write the robot as TOML; :meth:`from_toml` gives an equal robot back."""
+        files.write_toml(self.to_dict(), path)
+
+    @classmethod
+    def from_table(cls, path: str | os.PathLike[str], *, contacts: Sequence[Contact] = ()) -> Robot:
+        """The robot in a CSV table of D-H rows (see :func:`bodyplan.robot.files.read_table` for the columns),
+        named like the file. InputError names file, line and column."""
+        name, chains = files.read_table(path)
+        with located(str(path)):
+            return cls(name, chains, tuple(contacts))
+
+    from_csv = from_table
 
     def __reduce__(self) -> Any:
         return type(self), (self.name, self.chains, self.contacts, self.base_body)

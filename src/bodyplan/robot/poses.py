@@ -72,4 +72,5 @@ class Poses:
         return len(self._array)
 
     def __repr__(self) -> str:
-        return f"Poses(shape={self.shape}, frames={', '.join(self._names[:6])}{' ...' if len(self._names) > 6 else ''})"
+        more = " ..." if len(self._names) > 6 else ""
+        return f"Poses(shape={self.shape}, frames={', '.join(self._names[:6])}{more})"

@@ -3,9 +3,9 @@
     V_i = D_i V_(i-1) + E_i d(variables)/dt
 
 for body-fixed twists V = (v, omega) in m/s and rad/s, both in the axes of their own frame (in the paper
-"phi-dot" is this omega, not the rates of roll, pitch and yaw). NumPy, any leading batch shape. The composite of
-a chain is ``P = D_n ... D_1`` and ``Q = [D_n ... D_2 E_1 | ... | E_n]``; the paper prints the products in the
-opposite order.
+"phi-dot" is this omega, not the rates of roll, pitch and yaw). NumPy, any leading batch shape. The composite
+of a chain is ``P = D_n ... D_1`` and ``Q = [D_n ... D_2 E_1 | ... | E_n]``; the paper prints the products in
+the opposite order.
 """
 
 from __future__ import annotations

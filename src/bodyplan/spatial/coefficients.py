@@ -21,7 +21,7 @@ from bodyplan.arrays import Array
 SERIES_BELOW = 1.0
 
 
-@register_jitable  # type: ignore[untyped-decorator]
+@register_jitable  # type: ignore[no-untyped-decorator]
 def c_series(z):  # type: ignore[no-untyped-def]
     """C = (x - sin x)/x^3 for z = x^2 < 1: sum of (-z)^k/(2k + 3)!."""
     return (1.0 / 6.0) * (
@@ -47,7 +47,7 @@ def c_series(z):  # type: ignore[no-untyped-def]
     )
 
 
-@register_jitable  # type: ignore[untyped-decorator]
+@register_jitable  # type: ignore[no-untyped-decorator]
 def b_slope_series(z):  # type: ignore[no-untyped-def]
     """dB/dx / x = (A - 2 B)/x^2 for z = x^2 < 1: sum of 2 (-1)^(k+1) (k+1) z^k/(2k + 4)!."""
     return (-1.0 / 12.0) * (

@@ -93,7 +93,7 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
 
 
 def quaternion_exp(phi: ArrayLike) -> Array:
-    """Unit quaternions (..., 4) of rotation vectors (..., 3) rad: (cos(x/2), phi sin(x/2)/x), sign not chosen."""
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) rad: (cos(x/2), phi sin(x/2)/x)."""
     phi = np.asarray(phi, dtype=np.float64)
     half = 0.5 * np.linalg.norm(phi, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * sinc(half) * phi], axis=-1)
