@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module  # the writers live on a higher floor and are looked up by name
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -139,6 +142,17 @@ class Motion:
     def poses(self) -> Any:
         """Poses of every frame at every sample: ``robot.forward(q, base)``."""
         return self.robot.forward(self.q, self.base)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the motion in the format of the path's suffix (``bodyplan.export.FORMATS``) and return the path."""
+        saved: Path = import_module("bodyplan.export").save(self, path)
+        return saved
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Motion:
+        """The motion in an ``.npz`` file written by :meth:`save`; equal to the one saved."""
+        loaded: Motion = import_module("bodyplan.export").load(path)
+        return loaded
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):

@@ -135,6 +135,16 @@ class ConcertinaCurve:
         """dy/dx, the right-hand one at a junction; shapes as for the call."""
         return self._evaluate(x)[1]
 
+    def offset(self, x: Array, y: Array) -> Array:
+        """Distance, to first order, of points (x, y) from the curve: |y - y(x)| / sqrt(1 + slope^2), negative below.
+
+        Shapes as for the call. Points behind the start (by rounding at most) are measured from the start.
+        """
+        ahead = np.maximum(x, 0.0)
+        value, slope = self._evaluate(ahead)
+        off = (np.asarray(y) - value) / np.sqrt(1.0 + slope * slope)
+        return np.where(np.asarray(x) < 0.0, np.hypot(off, ahead - x), off)
+
     def arclength(self, x: ArrayLike) -> Array:
         """Arc length from the tail end to x, shapes as for the call, error <= 1e-13 relative."""
         xs = finite(x, "x")

@@ -1,0 +1,196 @@
+"""Tests that hold for every motion: solved, rates, limits, rigid links, the body against itself and the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.check.claims import allowance
+from bodyplan.check.report import Line
+from bodyplan.errors import Status
+from bodyplan.motion import Motion
+from bodyplan.robot.elements import Row
+
+#: share of the peak rate by which positions and rates may disagree between two samples
+RATE_SLACK = 0.05
+#: slack of lengths and limits
+EXACT = 1e-9
+#: samples times pairs of shapes handled at once
+CHUNK = 400_000
+
+
+def solved(motion: Motion) -> Line:
+    """Samples that the planner could not solve."""
+    bad = np.flatnonzero(motion.status != Status.OK.value)
+    detail = "" if not len(bad) else f"{motion.status[bad[0]]} at {motion.t[bad[0]]:.4g} s"
+    return Line("every sample solved", float(len(bad)), 0.0, "samples", not len(bad), detail, kind="solved")
+
+
+def plan_residual(motion: Motion) -> Line:
+    """The planner's own equations, as it reports them."""
+    value = float(motion.residual.max())
+    limit = 1e-6
+    return Line("residual of the plan", value, limit, "m", value <= limit, kind="residual")
+
+
+def rates_agree(motion: Motion) -> Line:
+    """Between two samples a joint must move at a speed between its rates at both (give or take its acceleration)."""
+    h = np.diff(motion.t)[:, None]
+    mean = np.diff(motion.q, axis=0) / h
+    low, high = np.minimum(motion.qd[:-1], motion.qd[1:]), np.maximum(motion.qd[:-1], motion.qd[1:])
+    bend = h * np.maximum(np.abs(motion.qdd[:-1]), np.abs(motion.qdd[1:]))
+    beyond = np.maximum(low - bend - mean, mean - high - bend)
+    peak = float(np.abs(motion.qd).max(initial=0.0))
+    slack = RATE_SLACK * peak + EXACT
+    value = float(beyond.max(initial=0.0))
+    at = np.unravel_index(int(beyond.argmax()), beyond.shape) if beyond.size else (0, 0)
+    passed = value <= slack
+    detail = "" if passed else f"joint {motion.joints[at[1]]} after {motion.t[at[0]]:.4g} s"
+    return Line("rates agree with positions", max(value, 0.0), slack, "rad/s", passed, detail, kind="rates")
+
+
+def joint_limits(motion: Motion) -> list[Line]:
+    """Distance to the nearest joint limit, and the largest share of a joint's rate limit."""
+    lines = []
+    limits = motion.robot.limits
+    if np.isfinite(limits).any():
+        room = np.minimum(motion.q - limits[:, 0], limits[:, 1] - motion.q)
+        at = np.unravel_index(int(room.argmin()), room.shape)
+        value = float(room[at])
+        lines.append(Line("joint limits", value, 0.0, "rad", value >= -EXACT,
+                          f"closest: {motion.joints[at[1]]} at {motion.t[at[0]]:.4g} s", at_least=True, kind="limits"))
+    rates = motion.robot.rates
+    if np.isfinite(rates).any():
+        share = np.abs(motion.qd) / rates
+        at = np.unravel_index(int(share.argmax()), share.shape)
+        value = float(share[at])
+        lines.append(Line("joint rates, share of the limit", value, 1.0, "", value <= 1.0 + EXACT,
+                          f"fastest: {motion.joints[at[1]]} at {motion.t[at[0]]:.4g} s", kind="limits"))
+    return lines
+
+
+def link_lengths(motion: Motion, positions: Array) -> Line | None:
+    """Rows of constant length must keep it: distances between consecutive frames in forward kinematics."""
+    worst, count = 0.0, 0
+    for chain in motion.robot.chains:
+        before = motion.robot.frame_index(chain.parent)
+        for i, element in enumerate(chain.elements):
+            here = motion.robot.frame_index(chain.frame_name(i))
+            if isinstance(element, Row) and isinstance(element.a, float) and isinstance(element.d, float):
+                length = float(np.hypot(element.a, element.d))
+                made = np.linalg.norm(positions[:, here] - positions[:, before], axis=-1)
+                worst, count = max(worst, float(np.abs(made - length).max())), count + 1
+            before = here
+    if not count:
+        return None
+    return Line("link lengths kept", worst, EXACT, "m", worst <= EXACT, f"{count} links", kind="lengths")
+
+
+def _skeletons(motion: Motion) -> tuple[Array, Array, list[int]]:
+    """End points (T, c, 2, 3) of every capsule and sphere, radii (c,), and their indices among the contacts."""
+    poses = motion.robot.forward(motion.q, motion.base)
+    ends, radii, which = [], [], []
+    for k, contact in enumerate(motion.robot.contacts):
+        if contact.shape not in ("capsule", "sphere"):
+            continue
+        i = motion.robot.frame_index(contact.frame)
+        last = contact.end if contact.shape == "capsule" else contact.start
+        local = np.array([contact.start, last])
+        ends.append(np.einsum("tij,pj->tpi", poses.rotations[:, i], local) + poses.positions[:, None, i])
+        radii.append(contact.radius)
+        which.append(k)
+    size = len(motion.t)
+    return (np.stack(ends, axis=1) if ends else np.zeros((size, 0, 2, 3))), np.array(radii), which
+
+
+def segment_distance(p: Array, q: Array) -> Array:
+    """Smallest distance (...,) between segments p and q (..., 2, 3), exact also where they cross or degenerate."""
+    d1, d2, r = p[..., 1, :] - p[..., 0, :], q[..., 1, :] - q[..., 0, :], p[..., 0, :] - q[..., 0, :]
+    a, e, b = (d1 * d1).sum(-1), (d2 * d2).sum(-1), (d1 * d2).sum(-1)
+    c, f = (d1 * r).sum(-1), (d2 * r).sum(-1)
+    # the closest pair of two segments is at their crossing (if any) or has an end point in it
+    det = a * e - b * b
+    crossing = det > 1e-14 * np.maximum(a * e, 1e-300)
+    safe = np.where(crossing, det, 1.0)
+    s, u = (b * f - c * e) / safe, (a * f - b * c) / safe
+    inside = crossing & (s >= 0) & (s <= 1) & (u >= 0) & (u <= 1)
+    gap = r + s[..., None] * d1 - u[..., None] * d2
+    best = np.where(inside, (gap * gap).sum(-1), np.inf)
+    for point, seg in ((p[..., 0, :], q), (p[..., 1, :], q), (q[..., 0, :], p), (q[..., 1, :], p)):
+        along = seg[..., 1, :] - seg[..., 0, :]
+        square = (along * along).sum(-1)
+        x = ((point - seg[..., 0, :]) * along).sum(-1) / np.where(square > 0, square, 1.0)
+        off = point - seg[..., 0, :] - np.clip(x, 0.0, 1.0)[..., None] * along
+        best = np.minimum(best, (off * off).sum(-1))
+    return np.sqrt(np.asarray(best))
+
+
+def self_clearance(motion: Motion) -> Line | None:
+    """Smallest gap between two capsules or spheres that are not on neighbouring links."""
+    ends, radii, which = _skeletons(motion)
+    apart = _separate_pairs(motion, which)
+    if not len(apart):
+        return None
+    best, when, pair = np.inf, 0, apart[0]
+    step = max(1, CHUNK // len(apart))
+    first, second = apart[:, 0], apart[:, 1]
+    for k in range(0, len(motion.t), step):
+        gap = segment_distance(ends[k : k + step, first], ends[k : k + step, second]) - radii[first] - radii[second]
+        at = np.unravel_index(int(gap.argmin()), gap.shape)
+        if gap[at] < best:
+            best, when, pair = float(gap[at]), k + int(at[0]), apart[at[1]]
+    names = [motion.robot.contacts[which[i]].name for i in pair]
+    return Line("links clear of each other", best, 0.0, "m", best >= -EXACT,
+                f"closest: {names[0]} and {names[1]} at {motion.t[when]:.4g} s", at_least=True, kind="self")
+
+
+def _separate_pairs(motion: Motion, which: list[int]) -> Array:
+    """Pairs of shapes with at least one whole link between them."""
+    robot = motion.robot
+    place: dict[str, tuple[str, int]] = {}
+    for chain in robot.chains:
+        carrying = [chain.frame_name(i) for i in range(len(chain.elements))
+                    if any(c.frame == chain.frame_name(i) for c in robot.contacts)]
+        place.update({name: (chain.name, i) for i, name in enumerate(carrying)})
+    pairs = []
+    for a in range(len(which)):
+        for b in range(a + 1, len(which)):
+            pa, pb = (place.get(robot.contacts[which[i]].frame) for i in (a, b))
+            near = pa is None or pb is None or (pa[0] == pb[0] and abs(pa[1] - pb[1]) <= 1)
+            if not near:
+                pairs.append((a, b))
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def ground_clearance(motion: Motion) -> list[Line]:
+    """Gap between the capsules and spheres and the floor, and all ground; walls may be pressed as claimed."""
+    ends, radii, which = _skeletons(motion)
+    if not len(which):
+        return []
+    mix = np.array([0.0, 0.25, 0.5, 0.75, 1.0])[:, None]
+    points = ends[:, :, None, 0] * (1.0 - mix) + ends[:, :, None, 1] * mix
+    surface = radii[None, :, None]
+    normal_z = motion.ground.normal(points[..., 0], points[..., 1])[..., 2]
+    above = (points[..., 2] - motion.ground.height(points[..., 0], points[..., 1])) * normal_z - surface
+    lines = [_worst_gap(motion, which, above, "clear of the floor", EXACT)]
+    presses = allowance(motion, "presses", {})
+    depth = float(presses.get("depth", 0.0))
+    gap = motion.ground.clearance(points) - surface
+    if depth > 0.0:
+        line = _worst_gap(motion, which, gap, f"presses on the {presses['role']} no deeper than planned", depth + EXACT)
+        deepest = float(radii.min())
+        shallow = depth < deepest
+        lines.append(Line(line.what, line.value, -depth, "m", bool(line.passed and shallow),
+                          line.detail if shallow else f"deeper than the radius of the body, {deepest:.3g} m",
+                          at_least=True, kind="presses"))
+    elif np.any(np.abs(gap - above) > EXACT):
+        lines.append(_worst_gap(motion, which, gap, "clear of walls and ceiling", EXACT))
+    return lines
+
+
+def _worst_gap(motion: Motion, which: list[int], gap: Array, what: str, allowed: float) -> Line:
+    at = np.unravel_index(int(gap.argmin()), gap.shape)
+    value = float(gap[at])
+    name = motion.robot.contacts[which[int(at[1])]].name
+    return Line(what, value, 0.0, "m", value >= -allowed, f"closest: {name} at {motion.t[at[0]]:.4g} s", at_least=True,
+                kind="ground")

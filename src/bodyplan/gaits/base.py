@@ -1,0 +1,36 @@
+"""What a gait is: options checked where it is built, and a planner from robot, ground and times to a Motion."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+from bodyplan.arrays import Array
+from bodyplan.ground.base import Ground
+from bodyplan.motion import Motion
+from bodyplan.robot.model import Robot
+
+
+class Gait(ABC):
+    """A way to move. Options are keyword arguments, validated at construction, equal by value."""
+
+    #: name in mission files
+    kind: str = ""
+
+    @abstractmethod
+    def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
+        """The motion at times t (T,) s. Raises InputError where robot or ground cannot do this gait at all;
+        samples that fail have a status."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The options as JSON types, with ``kind``."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Gait) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(repr(self.to_dict()))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.to_dict().items() if k != 'kind')})"
