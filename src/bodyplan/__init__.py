@@ -1,1 +1,112 @@
-"""bodyplan."""
+"""bodyplan: say how the body should move over real ground; get what every joint must do, and see it in physics.
+
+    import bodyplan as bp
+    snake = bp.snake(links=26, link_length=0.05)
+    motion = bp.plan(snake, bp.Concertina(body_modules=4), bp.Plane(), bp.times(0, 20, dt=0.02))
+    print(bp.check(motion))
+    trial = bp.simulate(motion)
+
+SI units and radians; world x forward, y left, z up; a pose is position then quaternion **wxyz**, world_from_body;
+a twist is (v, omega), body-fixed unless its name says otherwise. Names are loaded when first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bodyplan import curves, export, fitting, gaits, ground, rates, spatial
+    from bodyplan.check import Report, check
+    from bodyplan.curves import ConcertinaCurve
+    from bodyplan.errors import (
+        BodyplanError,
+        InputError,
+        MissingExtraError,
+        SolveError,
+        Status,
+        UnknownNameError,
+    )
+    from bodyplan.export import load, save
+    from bodyplan.fitting import exact_link_length, links_on_curve
+    from bodyplan.gaits import Concertina
+    from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
+    from bodyplan.job import run
+    from bodyplan.missions import load_mission
+    from bodyplan.motion import Claim, Motion, times
+    from bodyplan.plan import plan
+    from bodyplan.robot import Arc, Body, Chain, Contact, Joint, Robot, Row, WheelRadius, snake
+    from bodyplan.simulate import Friction, Trial, simulate
+
+__version__ = "0.1.0"
+
+#: name -> module it comes from; loading them all would cost a second, most users need few
+_FACE = {
+    "BodyplanError": "errors",
+    "InputError": "errors",
+    "MissingExtraError": "errors",
+    "SolveError": "errors",
+    "Status": "errors",
+    "UnknownNameError": "errors",
+    "Arc": "robot",
+    "Body": "robot",
+    "Chain": "robot",
+    "Contact": "robot",
+    "Joint": "robot",
+    "Robot": "robot",
+    "Row": "robot",
+    "WheelRadius": "robot",
+    "snake": "robot",
+    "Corridor": "ground",
+    "HeightMap": "ground",
+    "Plane": "ground",
+    "Profile": "ground",
+    "Surface": "ground",
+    "ConcertinaCurve": "curves",
+    "exact_link_length": "fitting",
+    "links_on_curve": "fitting",
+    "Concertina": "gaits",
+    "Claim": "motion",
+    "Motion": "motion",
+    "times": "motion",
+    "plan": "plan",
+    "Report": "check",
+    "check": "check",
+    "Friction": "simulate",
+    "Trial": "simulate",
+    "simulate": "simulate",
+    "load": "export",
+    "save": "export",
+    "load_mission": "missions",
+    "run": "job",
+}
+_MODULES = ("curves", "errors", "export", "fitting", "gaits", "ground", "rates", "robot", "spatial", "units")
+
+__all__ = [*sorted(_FACE), "curves", "export", "fitting", "gaits", "ground", "rates", "spatial"]  # noqa: PLE0604
+
+
+class _Face(ModuleType):
+    """Keeps ``bodyplan.check`` the verb: importing the subpackage of that name must not shadow the function."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _FACE and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Face
+
+
+def __getattr__(name: str) -> Any:
+    if name in _FACE:
+        value = getattr(importlib.import_module(f"bodyplan.{_FACE[name]}"), name)
+        globals()[name] = value
+        return value
+    if name in _MODULES:
+        return importlib.import_module(f"bodyplan.{name}")
+    raise AttributeError(f"module 'bodyplan' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_FACE, *_MODULES})

@@ -1,1 +1,9 @@
+"""One file a gait. :data:`KINDS` is the registry: a new gait is one class and one line."""
 
+from bodyplan.gaits.base import Gait
+from bodyplan.gaits.concertina import Concertina
+
+#: every gait by its name in mission files
+KINDS: dict[str, type[Gait]] = {gait.kind: gait for gait in (Concertina,)}
+
+__all__ = ["KINDS", "Concertina", "Gait"]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from bodyplan.arrays import Array
 from bodyplan.ground.base import Ground
@@ -15,12 +16,22 @@ class Gait(ABC):
     """A way to move. Options are keyword arguments, validated at construction, equal by value."""
 
     #: name in mission files
-    kind: str = ""
+    kind: ClassVar[str] = ""
+    #: dimension (of ``bodyplan.units``) of every option that has one, for mission files
+    UNITS: ClassVar[Mapping[str, str]] = {}
 
     @abstractmethod
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
         """The motion at times t (T,) s. Raises InputError where robot or ground cannot do this gait at all;
         samples that fail have a status."""
+
+    def period(self, robot: Robot) -> float | None:
+        """Time in s after which the gait repeats with this robot; None for a gait that does not."""
+        return None
+
+    def variants(self) -> dict[str, Gait]:
+        """Gaits worth setting beside this one in the report, by label (this one included); empty where there are none."""
+        return {}
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:

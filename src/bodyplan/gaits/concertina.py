@@ -6,9 +6,10 @@ stretches the whole body at once and so keeps folds gripping at both ends.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -51,7 +52,10 @@ class Concertina(Gait):
     Raises InputError for values outside these ranges.
     """
 
-    kind = "concertina"
+    kind: ClassVar[str] = "concertina"
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "stretch_time": "time", "max_joint_rate": "angular_rate", "length_unit": "length"
+    }
 
     def __init__(
         self,
@@ -115,7 +119,16 @@ class Concertina(Gait):
 
     def body(self, robot: Robot) -> ConcertinaBody:
         """The gait fitted to one robot: unit, contracted pose, sweep and cycle. Raises InputError or SolveError."""
-        return ConcertinaBody.of(self, robot)
+        return _fitted(self, robot)
+
+    def period(self, robot: Robot) -> float:
+        """Time of one cycle, s: a sweep, or its share between two waves."""
+        return self.body(robot).cycle.period
+
+    def variants(self) -> dict[str, Gait]:
+        """The same gait with both blends: how gamma changes decides the accelerations."""
+        options = {name: value for name, value in self.to_dict().items() if name != "kind"}
+        return {f"{blend} blend": Concertina(**{**options, "blend": blend}) for blend in BLENDS}
 
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
         """The motion at times t (T,) s, from t = 0 on: the tail end starts at the world's origin, heading x."""
@@ -254,6 +267,11 @@ class ConcertinaBody:
     def _gain(self) -> float:
         assert isinstance(self.sweep, (ExtensionSweep, LiteralSweep))
         return self.sweep.gain
+
+
+@lru_cache(maxsize=8)
+def _fitted(gait: Concertina, robot: Robot) -> ConcertinaBody:
+    return ConcertinaBody.of(gait, robot)
 
 
 def robot_length(snake: PlanarSnake) -> float:

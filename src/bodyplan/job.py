@@ -1,0 +1,207 @@
+"""A whole job: a mission planned, checked, simulated, compared, and written to a folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.check import Report, check
+from bodyplan.errors import InputError
+from bodyplan.metrics import Metrics, metrics_of
+from bodyplan.missions import Mission, load_mission
+from bodyplan.motion import Motion
+from bodyplan.plan import plan
+from bodyplan.show.outcome import Comparison, Outcome, Variant
+
+#: how a caller hears of progress: (what is being done, part done in [0, 1])
+Progress = Callable[[str, float], None]
+
+
+def _silent(step: str, part: float) -> None:
+    pass
+
+
+def mission_times(mission: Mission) -> Array:
+    """Times of a mission (T,) s: whole steps a cycle, so that samples one cycle apart can be compared."""
+    period = mission.gait.period(mission.robot)
+    time = mission.time
+    if period is None:
+        if time.stop is None:
+            raise InputError("time.stop: this gait has no cycle; say how long, for example stop = \"10 s\".")
+        steps = max(1, int(np.ceil(time.stop / time.dt)))
+        return np.linspace(0.0, time.stop, steps + 1)
+    stop = time.stop if time.stop is not None else (2.0 if time.cycles is None else time.cycles) * period
+    a_cycle = max(4, int(np.ceil(period / time.dt - 1e-9)))
+    step = period / a_cycle
+    return np.arange(int(np.floor(stop / step + 1e-9)) + 1) * step
+
+
+def plan_mission(mission: Mission) -> Motion:
+    """The mission's motion."""
+    if mission.time.stop is not None and mission.time.cycles is not None:
+        raise InputError("time: give cycles or stop, not both.")
+    return plan(mission.robot, mission.gait, mission.ground, mission_times(mission))
+
+
+def simulate_mission(mission: Mission, motion: Motion, progress: Callable[[float], None] | None = None) -> Any:
+    """The mission's trial, or None where the mission has ``simulate = false``."""
+    settings = mission.simulate
+    if settings is None:
+        return None
+    from bodyplan.simulate import Friction, simulate
+
+    friction: Any = settings.friction
+    if friction is not None and not isinstance(friction, float):
+        friction = Friction(friction.forward, friction.backward, friction.sideways)
+    return simulate(motion, cycles=settings.cycles, friction=friction, servo=settings.servo, dt=settings.dt,
+                    settle=settings.settle, ramp=settings.ramp, progress=progress)
+
+
+def compare_mission(name: str) -> Comparison:
+    """Plan and simulate a ready mission for its figures alone."""
+    mission = load_mission(name)
+    motion = plan_mission(mission)
+    trial = simulate_mission(mission, motion)
+    return Comparison.of(mission.name, mission.title, motion, trial)
+
+
+def _variants(mission: Mission, t: Array) -> tuple[Variant, ...]:
+    return tuple(
+        Variant.of(label, plan(mission.robot, gait, mission.ground, mission_times_of(gait, mission, t)))
+        for label, gait in mission.gait.variants().items()
+    )
+
+
+def mission_times_of(gait: Any, mission: Mission, t: Array) -> Array:
+    """Even times of one cycle of a variant, as finely sampled as the mission."""
+    period = gait.period(mission.robot) or float(t[-1])
+    steps = max(8, round(period / float(t[1] - t[0])))
+    return np.linspace(0.0, period, steps + 1)
+
+
+def work(mission: Mission, *, simulate: bool = True, compare: bool = True, progress: Progress = _silent) -> Outcome:
+    """Plan, check, simulate and compare a mission; nothing is written. See :func:`run`."""
+    progress("planning", 0.0)
+    motion = plan_mission(mission)
+    progress("checking", 0.0)
+    report = check(motion)
+    variants = _variants(mission, motion.t)
+    others: Sequence[Comparison] = ()
+    trial = None
+    if simulate and mission.simulate is not None:
+        names = mission.compare if compare else ()
+        # the other missions run beside this one where there is a second core
+        workers = min(len(names), max(1, (os.cpu_count() or 1) - 1))
+        if names and (os.cpu_count() or 1) > 1:
+            with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+                waiting = [pool.submit(compare_mission, name) for name in names]
+                trial = simulate_mission(mission, motion, lambda part: progress("simulating", part))
+                others = []
+                for i, future in enumerate(waiting):
+                    progress("comparing", i / len(waiting))
+                    others.append(future.result())
+        else:
+            trial = simulate_mission(mission, motion, lambda part: progress("simulating", part))
+            others = [compare_mission(name) for name in names]
+    return Outcome(mission.name, mission.title, mission.about.strip(), mission.text, mission.overrides, motion, report,
+                   trial, tuple(others), variants)
+
+
+def run(
+    mission: Mission | str | Path,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    overrides: Iterable[str] = (),
+    force: bool = False,
+    simulate: bool = True,
+    compare: bool = True,
+    progress: Progress = _silent,
+) -> Result:
+    """Run a mission end to end and write its folder.
+
+    ``mission``: a ready mission's name, a TOML file, or a :class:`Mission`. ``out``: the folder (default
+    ``runs/<name>``); an existing one is refused unless ``force``. ``overrides``: texts "gait.omega=1.2".
+    The folder appears only when everything in it is written: report.html, figures/, motion.csv, motion.npz,
+    robot.xml, metrics.json, mission.toml. Raises InputError for bad input.
+    """
+    if not isinstance(mission, Mission):
+        mission = load_mission(mission, tuple(overrides))
+    folder = Path(out) if out is not None else Path("runs") / mission.name
+    refuse_existing(folder, force)
+    outcome = work(mission, simulate=simulate, compare=compare, progress=progress)
+    metrics = metrics_of(outcome)
+    progress("writing", 0.0)
+    write_folder(outcome, metrics, folder, force)
+    return Result(outcome, metrics, folder)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished run: its :class:`Outcome`, its metrics and its folder."""
+
+    outcome: Outcome
+    metrics: Metrics
+    folder: Path
+    report: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "report", self.folder / "report.html")
+
+    @property
+    def ok(self) -> bool:
+        """True where every check passed and the physics did not diverge."""
+        return self.outcome.ok
+
+
+def refuse_existing(path: Path, force: bool) -> None:
+    """InputError where ``path`` exists and may not be replaced."""
+    if path.exists() and not force:
+        raise InputError(f"{path}: exists already; choose another place with --out, or --force to replace it.")
+    if path.exists() and path.is_dir() and not (path / "metrics.json").is_file() and any(path.iterdir()):
+        raise InputError(f"{path}: is not a folder that bodyplan wrote (no metrics.json in it); it is left alone.")
+
+
+def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) -> None:
+    """Write every file of a run to a temporary folder beside ``folder``, then move it into place."""
+    from bodyplan.show.report import write_report
+
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    try:
+        motion = outcome.motion
+        for name in ("motion.csv", "motion.npz", "robot.xml"):
+            motion.save(scratch / name)
+        (scratch / "metrics.json").write_text(
+            json.dumps(metrics.model_dump(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
+        (scratch / "mission.toml").write_text(_mission_text(outcome), encoding="utf-8")
+        write_report(outcome, scratch)
+        scratch.chmod(0o755)
+        if folder.exists():
+            refuse_existing(folder, force)
+            old = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
+            folder.replace(old / folder.name)
+            scratch.replace(folder)
+            shutil.rmtree(old)
+        else:
+            scratch.replace(folder)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _mission_text(outcome: Outcome) -> str:
+    if not outcome.overrides:
+        return outcome.mission_text
+    lines = "".join(f"#   --set {item}\n" for item in outcome.overrides)
+    return f"# Run with these changes:\n{lines}\n{outcome.mission_text}"

@@ -1,0 +1,138 @@
+"""The schema of a mission file: pydantic models made from the signatures of robots, gaits and grounds.
+
+A new kind is one line in its registry; its options, their defaults and their units follow from its signature and
+from its ``UNITS`` (option -> dimension of :mod:`bodyplan.units`), so that nothing is declared twice.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+
+from bodyplan import gaits
+from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
+from bodyplan.robot.library import snake
+from bodyplan.robot.model import Robot
+from bodyplan.units import to_si
+
+STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+
+Builder = Callable[..., Any]
+
+_SNAKE_UNITS = {"link_length": "length", "radius": "length", "mass": "mass", "limits": "angle", "rate": "angular_rate",
+                "effort": "torque"}
+
+
+def _robot_file(path: str) -> Robot:
+    """A robot from its TOML file."""
+    return Robot.from_toml(path)
+
+
+def _robot_table(path: str) -> Robot:
+    """A robot from a CSV table of extended D-H parameters."""
+    return Robot.from_table(path)
+
+
+#: kind -> (builder, units of its options)
+ROBOTS: dict[str, tuple[Builder, Mapping[str, str]]] = {
+    "snake": (snake, _SNAKE_UNITS),
+    "file": (_robot_file, {}),
+    "table": (_robot_table, {}),
+}
+GAITS: dict[str, tuple[Builder, Mapping[str, str]]] = {kind: (cls, cls.UNITS) for kind, cls in gaits.KINDS.items()}
+GROUNDS: dict[str, tuple[Builder, Mapping[str, str]]] = {
+    "plane": (Plane, {"height": "length"}),
+    "surface": (Surface, {"bounds": "length"}),
+    "heightmap": (HeightMap.from_file, {"cell": "length", "origin": "length"}),
+    "corridor": (Corridor, {"width": "length", "height": "length", "floor": "length"}),
+    "profile": (Profile, {"floor": "length", "ceiling": "length"}),
+}
+SECTIONS = {"robot": ROBOTS, "gait": GAITS, "ground": GROUNDS}
+
+
+def _convert(value: Any, dimension: str) -> Any:
+    """Texts become SI numbers, also inside lists; everything else is left to the type's own check."""
+    if isinstance(value, str):
+        return to_si(value, dimension)
+    if isinstance(value, list):
+        return [_convert(v, dimension) for v in value]
+    return value
+
+
+_PLAIN = (int, float, str, bool, type(None))
+
+
+def _plain(annotation: Any) -> Any:
+    """The annotation where pydantic can check it as it stands, else Any (the builder checks it then)."""
+    if annotation in _PLAIN:
+        return annotation
+    parts = get_args(annotation)
+    if parts and get_origin(annotation) in (Union, UnionType, Sequence) and all(_plain(p) is not Any for p in parts):
+        return annotation
+    return Any
+
+
+def options_model(kind: str, builder: Builder, units: Mapping[str, str]) -> type[BaseModel]:
+    """The pydantic model of one kind's options, from the builder's signature."""
+    hints = get_type_hints(builder.__init__ if inspect.isclass(builder) else builder, include_extras=True)
+    fields: dict[str, Any] = {}
+    for name, parameter in inspect.signature(builder).parameters.items():
+        annotation = _plain(hints.get(name, Any))
+        if name in units:
+            annotation = Annotated[annotation, BeforeValidator(partial(_convert, dimension=units[name]))]
+        default = ... if parameter.default is inspect.Parameter.empty else parameter.default
+        fields[name] = (annotation, default)
+    return create_model(f"{kind} options", __config__=STRICT, **fields)
+
+
+def _quantity(dimension: str) -> Any:
+    return BeforeValidator(partial(_convert, dimension=dimension))
+
+
+class Time(BaseModel):
+    """``cycles`` of the gait or ``stop`` s, sampled at most ``dt`` s apart (dt is shortened to divide a cycle)."""
+
+    model_config = STRICT
+    cycles: Annotated[float, Field(gt=0, le=1000)] | None = None
+    stop: Annotated[float, _quantity("time"), Field(gt=0)] | None = None
+    dt: Annotated[float, _quantity("time"), Field(gt=0)] = 0.02
+
+
+class FrictionTriple(BaseModel):
+    """Coulomb coefficients of a scaly skin on the floor."""
+
+    model_config = STRICT
+    forward: Annotated[float, Field(ge=0)]
+    backward: Annotated[float, Field(ge=0)]
+    sideways: Annotated[float, Field(ge=0)]
+
+
+class Simulate(BaseModel):
+    """Settings of the physics; see ``bodyplan.simulate``."""
+
+    model_config = STRICT
+    cycles: Annotated[int, Field(ge=1, le=1000)] = 3
+    friction: float | FrictionTriple | None = None
+    servo: tuple[float, float] | None = None
+    dt: Annotated[float, _quantity("time"), Field(gt=0)] = 1e-3
+    settle: Annotated[float, _quantity("time"), Field(ge=0)] = 1.0
+    ramp: Annotated[float, _quantity("time"), Field(ge=0)] = 1.0
+
+
+class MissionModel(BaseModel):
+    """A mission file. ``robot``, ``gait`` and ``ground`` are tables with a ``kind`` and that kind's options."""
+
+    model_config = STRICT
+    title: Annotated[str, Field(max_length=200)]
+    about: Annotated[str, Field(max_length=5000)] = ""
+    robot: dict[str, Any]
+    gait: dict[str, Any]
+    ground: dict[str, Any]
+    time: Time = Time()
+    simulate: Simulate | None = Simulate()
+    compare: Annotated[list[str], Field(max_length=20)] = []
