@@ -1,0 +1,104 @@
+"""Mass, centre and inertia of a frame, from its Body, its contact shapes or a plain rod."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array
+from bodyplan.robot.elements import Body, Contact
+
+#: density of water, kg/m^3: gives a rod or a bare motor a thickness where nothing else says
+WATER = 1000.0
+#: half width of a rim's cylinder over its radius (a contact names the circle only)
+RIM_HALF_WIDTH = 0.1
+
+
+class Inertial(NamedTuple):
+    """``mass`` kg, ``com`` (3,) m in the frame, ``inertia`` (3, 3) kg m^2 about ``com`` in frame axes."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+def inertial(body: Body, contacts: Sequence[Contact], previous: ArrayLike) -> Inertial:
+    """Inertial properties of a frame that carries ``body`` and ``contacts``.
+
+    Where ``body`` names no centre of mass it is the centroid of the contact shapes, and without any the
+    middle of a rod from ``previous`` (3,), the origin of the previous frame in this one, to the origin.
+    Where it names no inertia it is that of the shapes as homogeneous solids, or of the rod, with the
+    thickness that gives it the density of water (a sphere where the rod has no length).
+    """
+    if contacts:
+        solids = [_solid(contact) for contact in contacts]
+        volumes = np.array([s.mass for s in solids])
+        centre = volumes @ np.array([s.com for s in solids]) / volumes.sum()
+        unit = (
+            sum((s.inertia + s.mass * _offset(s.com - centre) for s in solids), np.zeros((3, 3)))
+            / volumes.sum()
+        )
+    else:
+        rod = -np.asarray(previous, dtype=np.float64)
+        centre, unit = -0.5 * rod, _rod(rod, body.mass)
+    com = centre if body.com is None else np.array(body.com)
+    inertia = body.mass * unit
+    if body.inertia is not None:
+        xx, yy, zz, xy, xz, yz = body.inertia
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return Inertial(body.mass, com, inertia)
+
+
+def axis_of(contact: Contact) -> tuple[Array, float]:
+    """(unit axis (3,), length m) of a capsule from start to end; z and 0 where both are the same point."""
+    along = np.subtract(contact.end, contact.start)
+    length = float(np.linalg.norm(along))
+    return (along / length if length > 0.0 else np.array([0.0, 0.0, 1.0])), length
+
+
+def _solid(contact: Contact) -> Inertial:
+    """Volume (as mass at density 1), centroid and inertia of a contact shape."""
+    r, centre = contact.radius, np.array(contact.start)
+    if contact.shape == "sphere":
+        volume = 4.0 / 3.0 * np.pi * r**3
+        return Inertial(volume, centre, 0.4 * volume * r**2 * np.eye(3))
+    if contact.shape == "box":
+        half = np.array(contact.half)
+        volume = 8.0 * float(np.prod(half))
+        return Inertial(volume, centre, volume / 3.0 * np.diag(half @ half - half**2))
+    if contact.shape == "rim":
+        volume = np.pi * r**2 * 2.0 * RIM_HALF_WIDTH * r
+        return Inertial(
+            volume, centre, volume * _cylinder(np.array([0.0, 0.0, 1.0]), r, 2.0 * RIM_HALF_WIDTH * r)
+        )
+    axis, length = axis_of(contact)
+    tube, caps = np.pi * r**2 * length, 4.0 / 3.0 * np.pi * r**3
+    # two half balls: 2/5 m r^2 about the axis; across it, their centroids lie 3r/8 outside the tube's ends
+    across = caps * (0.4 * r**2 + 0.25 * length**2 + 0.375 * r * length)
+    line = np.outer(axis, axis)
+    ends = across * (np.eye(3) - line) + 0.4 * caps * r**2 * line
+    middle = 0.5 * np.add(contact.start, contact.end)
+    return Inertial(tube + caps, middle, tube * _cylinder(axis, r, length) + ends)
+
+
+def _cylinder(axis: Array, radius: float, length: float) -> Array:
+    """Inertia per mass (3, 3) of a solid cylinder about its centre."""
+    line = np.outer(axis, axis)
+    return (3.0 * radius**2 + length**2) / 12.0 * (np.eye(3) - line) + 0.5 * radius**2 * line
+
+
+def _rod(rod: Array, mass: float) -> Array:
+    """Inertia per mass (3, 3) of a rod about its middle, as thick as water of that mass and length."""
+    length = float(np.linalg.norm(rod))
+    ball = (3.0 * mass / (4.0 * np.pi * WATER)) ** (1.0 / 3.0)
+    if length <= ball:
+        return np.asarray(0.4 * ball**2 * np.eye(3))
+    return _cylinder(rod / length, float(np.sqrt(mass / (np.pi * WATER * length))), length)
+
+
+def _offset(d: Array) -> Array:
+    """Parallel-axis term (3, 3) of a unit mass at d (3,)."""
+    return np.asarray(d @ d * np.eye(3) - np.outer(d, d))

@@ -1,0 +1,148 @@
+"""From records of a run to the measures of a trial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.motion import Motion
+from bodyplan.simulate.library import mujoco
+from bodyplan.simulate.model import Physics
+from bodyplan.simulate.reference import Reference
+from bodyplan.simulate.trial import Slip
+
+#: planned advance a cycle below which a motion is not meant to go anywhere, m
+NOWHERE = 1e-9
+
+
+class Meter:
+    """Sums over time steps of the servos' error, torque and work; u actuators."""
+
+    def __init__(self, u: int) -> None:
+        self.steps = 0
+        self.error_square, self.error_most = np.zeros(u), np.zeros(u)
+        self.force_square, self.force_most = np.zeros(u), np.zeros(u)
+        self.positive, self.absolute = np.zeros(u), np.zeros(u)
+        self._a = np.zeros(u)
+
+    def add(self, target: Array, length: Array, velocity: Array, force: Array) -> None:
+        """One time step; every argument (u,), all at the same instant."""
+        a = self._a
+        np.subtract(target, length, out=a)
+        np.abs(a, out=a)
+        np.maximum(self.error_most, a, out=self.error_most)
+        self.error_square += a * a
+        np.abs(force, out=a)
+        np.maximum(self.force_most, a, out=self.force_most)
+        self.force_square += a * a
+        np.multiply(force, velocity, out=a)
+        self.positive += np.maximum(a, 0.0)
+        self.absolute += np.abs(a)
+        self.steps += 1
+
+    def per_joint(self, physics: Physics) -> dict[str, Array]:
+        """Measures (n,) for Trial, 0 for passive joints."""
+        count = max(self.steps, 1)
+        columns = {
+            "tracking_rms": np.sqrt(self.error_square / count),
+            "tracking_max": self.error_most,
+            "torque_rms": np.sqrt(self.force_square / count),
+            "torque_peak": self.force_most,
+        }
+        out = {name: np.zeros(physics.robot.n) for name in columns}
+        for name, values in columns.items():
+            out[name][physics.servos] = values
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """What a run recorded: t (S,), base (S, 7), q (S, n), torque (S, n), com (S, 3)."""
+
+    t: Array
+    base: Array
+    q: Array
+    torque: Array
+    com: Array
+
+
+def planned_advance(physics: Physics, reference: Reference, cycles: int) -> Array:
+    """Planned displacement (cycles, 3) m of the centre of mass in each cycle."""
+    mj = mujoco()
+    data = mj.MjData(physics.model)
+    centres = []
+    for cycle in range(cycles + 1):
+        phase = cycle * reference.duration
+        data.qpos[:] = physics.qpos(reference.joints(phase), reference.base(phase))
+        mj.mj_kinematics(physics.model, data)
+        mj.mj_comPos(physics.model, data)
+        centres.append(data.subtree_com[1].copy())
+    return np.diff(np.array(centres), axis=0)
+
+
+def progress_of(records: Records, planned: Array, start: float, period: float) -> dict[str, Any]:
+    """``advance``, ``advance_ratio``, ``sideways`` and ``speed`` for Trial."""
+    cycles = len(planned)
+    centres = at(records.t, records.com, start + period * np.arange(cycles + 1.0))
+    advance = np.diff(centres, axis=0)
+    ahead = directions(planned)
+    along = np.sum(advance * ahead, axis=1)
+    left = np.stack([-ahead[:, 1], ahead[:, 0], 0.0 * ahead[:, 0]], axis=1)
+    size = np.linalg.norm(planned, axis=1)
+    return {
+        "advance": advance,
+        "advance_ratio": along / size if np.all(size > NOWHERE) else None,
+        "sideways": np.sum(advance * left, axis=1),
+        "speed": float(along.sum() / (cycles * period)),
+    }
+
+
+def directions(planned: Array) -> Array:
+    """Unit vectors (cycles, 3) of the planned advance; x where none is planned."""
+    size = np.linalg.norm(planned, axis=1, keepdims=True)
+    return np.where(size > NOWHERE, planned / np.maximum(size, NOWHERE), np.array([1.0, 0.0, 0.0]))
+
+
+def slips_of(
+    motion: Motion, records: Records, planned: Array, start: float, period: float
+) -> tuple[Slip, ...]:
+    """What the ``at_rest`` claims of the motion became, cycle by cycle; intervals that end after the
+    measured part are left out."""
+    claims = [claim for claim in motion.claims if claim.kind == "at_rest"]
+    if not claims:
+        return ()
+    positions = motion.robot.forward(records.q, records.base).positions
+    ahead, end = directions(planned), start + len(planned) * period
+    out = []
+    for claim in claims:
+        frames = [motion.robot.frame_index(name) for name in claim.data["frames"]]
+        tracks = positions[:, frames]
+        for cycle in range(len(planned)):
+            shift = start - motion.t[0] + cycle * period
+            t0, t1 = float(claim.data["start"]) + shift, float(claim.data["end"]) + shift
+            if t1 > end + 1e-9 * period or t1 <= t0:
+                continue
+            between = records.t[(records.t > t0) & (records.t < t1)]
+            moved = at(records.t, tracks, np.concatenate([[t0], between, [t1]]))
+            moved -= moved[0].copy()
+            stage = str(claim.data.get("stage", claim.label))
+            along = float(np.mean(moved[-1] @ ahead[cycle]))
+            largest = float(np.max(np.linalg.norm(moved, axis=-1)))
+            out.append(Slip(stage, claim.label, cycle, t0, t1, along, largest))
+    return tuple(out)
+
+
+def at(t: Array, values: Array, times: Array) -> Array:
+    """``values`` (S, ...) recorded at ``t`` (S,), linear between records, at ``times`` (k,)."""
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    s = np.clip((times - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)
+    s = s.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[i] + s * (values[i + 1] - values[i]))
+
+
+def cost_of_transport(work: float, weight: float, distance: float) -> float | None:
+    """work / (weight distance) without unit, or None where nothing was travelled."""
+    return work / (weight * distance) if distance > 0.0 else None

@@ -1,0 +1,89 @@
+"""The planned motion as a function of phase: what the servos are told, cycle after cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array
+from bodyplan.errors import InputError
+from bodyplan.motion import Motion
+from bodyplan.spatial.rotations import canonical, conjugate, multiply, quaternion_exp, quaternion_log, rotate
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A motion on the phase axis (s): phase 0 is its first sample.
+
+    ``period``: s after which it repeats, moved by the displacement of the base; None where it runs once.
+    ``duration``: s of one run, the period or the length of the motion.
+    """
+
+    motion: Motion
+    period: float | None
+    duration: float
+
+    @classmethod
+    def of(cls, motion: Motion) -> Reference:
+        """Repeats with the period that the motion's ``periodic`` claim names, unless the motion is
+        shorter."""
+        length = float(motion.t[-1] - motion.t[0])
+        for claim in motion.claims:
+            if claim.kind == "periodic":
+                period = float(claim.data["period"])
+                if not period > 0.0:
+                    raise InputError(f"periodic claim {claim.label!r}: period must be > 0, got {period!r}.")
+                if period <= length * (1.0 + 1e-9):
+                    period = min(period, length)
+                    return cls(motion, period, period)
+        return cls(motion, None, length)
+
+    def joints(self, phase: ArrayLike) -> Array:
+        """Joint coordinates (..., n) at phases (...,): the cubic Hermite interpolant of q and dq/dt.
+        Outside a motion that does not repeat, its first or last sample."""
+        t, q, qd = self.motion.t, self.motion.q, self.motion.qd
+        time = t[0] + self._within(np.asarray(phase, dtype=np.float64))[1]
+        i = np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(t) - 2)
+        h = (t[i + 1] - t[i])[..., None]
+        s = np.clip((time - t[i])[..., None] / h, 0.0, 1.0)
+        # Hermite basis
+        rise = s * s * (3.0 - 2.0 * s)
+        out = q[i] + rise * (q[i + 1] - q[i])
+        out += h * s * (1.0 - s) * ((1.0 - s) * qd[i] - s * qd[i + 1])
+        return np.asarray(out)
+
+    def base(self, phase: float) -> Array:
+        """Planned pose (7,) of the base at one phase, cycles before and after the first included."""
+        cycle, time = self._within(np.asarray(float(phase)))
+        pose = self._sample(float(time))
+        if self.period is None:
+            return pose
+        first, last = self._sample(0.0), self._sample(self.period)
+        # world motion of one cycle: last = step * first
+        turn = multiply(last[3:], conjugate(first[3:]))
+        shift = last[:3] - rotate(turn, first[:3])
+        for _ in range(abs(int(cycle))):
+            if cycle > 0:
+                pose = np.concatenate([shift + rotate(turn, pose[:3]), multiply(turn, pose[3:])])
+            else:
+                back = conjugate(turn)
+                pose = np.concatenate([rotate(back, pose[:3] - shift), multiply(back, pose[3:])])
+        return np.concatenate([pose[:3], canonical(pose[3:])])
+
+    def _within(self, phase: Array) -> tuple[Array, Array]:
+        """(cycle number, s since its start)."""
+        if self.period is None:
+            return np.zeros_like(phase), np.clip(phase, 0.0, self.duration)
+        cycle = np.floor(phase / self.period)
+        return cycle, np.clip(phase - cycle * self.period, 0.0, self.period)
+
+    def _sample(self, time: float) -> Array:
+        """Base pose (7,) at ``time`` s after the first sample: between samples linear, turning evenly."""
+        t, base = self.motion.t, self.motion.base
+        i = int(np.clip(np.searchsorted(t, t[0] + time, side="right") - 1, 0, len(t) - 2))
+        s = min(max((t[0] + time - t[i]) / (t[i + 1] - t[i]), 0.0), 1.0)
+        a, b = base[i], base[i + 1]
+        step = quaternion_log(multiply(conjugate(a[3:]), b[3:]))
+        return np.concatenate([a[:3] + s * (b[:3] - a[:3]), multiply(a[3:], quaternion_exp(s * step))])

@@ -1,0 +1,114 @@
+"""Ground as MuJoCo shapes, and the pairs in which robot and ground may touch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bodyplan.errors import InputError
+from bodyplan.ground.base import Solid
+from bodyplan.robot.model import Robot
+from bodyplan.simulate.friction import Friction, Scales, pair_friction
+from bodyplan.simulate.library import mujoco
+from bodyplan.spatial.rotations import rotate
+
+#: thickness under the lowest point of a height field, m
+FIELD_BASE = 0.5
+FLOOR_RGBA, WALL_RGBA = (0.62, 0.66, 0.70, 1.0), (0.45, 0.55, 0.65, 0.35)
+
+
+def geom_name(solid: Solid) -> str:
+    return f"ground:{solid.name}"
+
+
+def add_solid(spec: Any, solid: Solid) -> None:
+    """One piece of ground as a fixed shape (height fields keep their heights in single precision)."""
+    mj, name, at = mujoco(), geom_name(solid), np.array(solid.position)
+    rgba = FLOOR_RGBA if solid.role == "floor" else WALL_RGBA
+    plain: dict[str, Any] = {"name": name, "contype": 0, "conaffinity": 0, "rgba": rgba}
+    if solid.kind == "plane":
+        spec.worldbody.add_geom(
+            type=mj.mjtGeom.mjGEOM_PLANE, pos=at, quat=solid.quaternion, size=[0, 0, 1.0], **plain
+        )
+    elif solid.kind == "box":
+        spec.worldbody.add_geom(
+            type=mj.mjtGeom.mjGEOM_BOX, pos=at, quat=solid.quaternion, size=solid.half, **plain
+        )
+    else:
+        if solid.z is None:
+            raise InputError(f"solid {solid.name!r}: a field needs heights z.")
+        rows, columns = solid.z.shape
+        half = 0.5 * np.array([(columns - 1) * solid.cell[0], (rows - 1) * solid.cell[1]])
+        bottom, rise = float(solid.z.min()), float(np.ptp(solid.z))
+        rise = rise or 1.0  # a level field: all its data are 0
+        spec.add_hfield(
+            name=name,
+            nrow=rows,
+            ncol=columns,
+            size=[*half, rise, FIELD_BASE],
+            userdata=((solid.z - bottom) / rise).ravel(),
+        )
+        spec.worldbody.add_geom(
+            type=mj.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*(at[:2] + half), bottom], **plain
+        )
+
+
+def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: float | Friction | None) -> None:
+    if not robot.contacts:
+        raise InputError(f"robot {robot.name!r}: has no contacts; it could only fall.")
+    for contact in robot.contacts:
+        for solid in solids:
+            along, across = pair_friction(solid, contact, friction)
+            if isinstance(friction, Friction) and solid.role == "floor":
+                if solid.kind != "plane":
+                    raise InputError(
+                        f"friction: scales need a plane floor, {solid.name!r} is a {solid.kind}."
+                    )
+                if contact.shape != "capsule" or contact.start == contact.end:
+                    raise InputError(f"friction: scales need capsules, contact {contact.name!r} is none.")
+            spec.add_pair(
+                name=f"{contact.name} on {solid.name}",
+                geomname1=contact.name,
+                geomname2=geom_name(solid),
+                condim=3,
+                friction=[along, across, 0.0, 0.0, 0.0],
+            )
+
+
+def add_self_pairs(spec: Any, robot: Robot) -> None:
+    near = {
+        frozenset((c.frame_name(i), c.parent if i == 0 else c.frame_name(i - 1)))
+        for c in robot.chains
+        for i in range(len(c.elements))
+    }
+    for i, one in enumerate(robot.contacts):
+        for other in robot.contacts[i + 1 :]:
+            if one.frame != other.frame and frozenset((one.frame, other.frame)) not in near:
+                mu = max((f for f in (one.friction, other.friction) if f is not None), default=0.5)
+                spec.add_pair(
+                    name=f"{one.name} on {other.name}",
+                    geomname1=one.name,
+                    geomname2=other.name,
+                    condim=3,
+                    friction=[mu, mu, 0.0, 0.0, 0.0],
+                )
+
+
+def scales_of(model: Any, robot: Robot, solids: tuple[Solid, ...], friction: Friction) -> Scales:
+    floors = [solid for solid in solids if solid.role == "floor"]
+    pairs = [
+        (model.pair(f"{c.name} on {s.name}").id, model.geom(c.name).id, c, s)
+        for s in floors
+        for c in robot.contacts
+    ]
+    geoms = np.array([geom for _, geom, _, _ in pairs])
+    normals = np.array([rotate(np.array(s.quaternion), np.array([0.0, 0.0, 1.0])) for *_, s in pairs])
+    return Scales(
+        friction,
+        np.array([pair for pair, *_ in pairs]),
+        geoms,
+        model.geom_bodyid[geoms].astype(np.int64),
+        np.array([c.radius for _, _, c, _ in pairs]),
+        normals,
+    )
