@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from bodyplan.check import body
 from bodyplan.check.claims import test_claim
 from bodyplan.check.report import Line, Report
@@ -18,7 +20,25 @@ def check(motion: Motion) -> Report:
         body.plan_residual(motion),
         body.link_lengths(motion, positions),
     ]
-    lines += [test_claim(motion, positions, claim) for claim in motion.claims]
+    lines += _gathered([test_claim(motion, positions, claim) for claim in motion.claims])
     lines += [body.rates_agree(motion), *body.joint_limits(motion), body.self_clearance(motion)]
     lines += body.ground_clearance(motion)
     return Report(tuple(line for line in lines if line is not None))
+
+
+def _gathered(lines: list[Line | None]) -> list[Line]:
+    """Lines called "part: stage" become one line a part: the worst of its stages, any failure first."""
+    groups: dict[str, list[Line]] = {}
+    for line in lines:
+        if line is not None:
+            groups.setdefault(line.what.partition(":")[0], []).append(line)
+    out = []
+    for part, group in groups.items():
+        worst = min(group, key=lambda line: (line.passed is not False, line.passed is None, -_strain(line)))
+        count = f"{len(group)} stages; " if len(group) > 1 else ""
+        out.append(replace(worst, what=part, detail=f"{count}worst: {worst.detail}" if count else worst.detail))
+    return out
+
+
+def _strain(line: Line) -> float:
+    return abs(line.value) / line.limit if line.value is not None and line.limit else 0.0

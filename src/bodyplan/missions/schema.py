@@ -136,3 +136,14 @@ class MissionModel(BaseModel):
     time: Time = Time()
     simulate: Simulate | None = Simulate()
     compare: Annotated[list[str], Field(max_length=20)] = []
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a mission file, with the options of every kind of robot, gait and ground under ``kinds``."""
+    return {
+        "mission": MissionModel.model_json_schema(),
+        "kinds": {
+            section: {kind: options_model(kind, *entry).model_json_schema() for kind, entry in registry.items()}
+            for section, registry in SECTIONS.items()
+        },
+    }

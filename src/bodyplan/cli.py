@@ -1,0 +1,283 @@
+"""The command line. Exit codes: 0 ok, 1 a failed check (or physics that diverged), 2 bad input."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+# everything else is imported inside the commands: --help must answer at once
+if TYPE_CHECKING:
+    from bodyplan.job import Result
+    from bodyplan.missions import Mission
+    from bodyplan.motion import Motion
+
+app = typer.Typer(
+    name="bodyplan",
+    help="Say how the body should move over real ground; see what every joint must do, whether the ground allows it, "
+    "and what physics makes of it.",
+    epilog="Start with: bodyplan run concertina",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+MissionArgument = Annotated[str, typer.Argument(help="A ready mission's name (see: bodyplan missions) or a .toml file.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a field, for example gait.omega=1.1. May be repeated."),
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+
+
+def _version(value: bool) -> None:
+    if value:
+        from bodyplan import __version__
+
+        typer.echo(f"bodyplan {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def run(
+    mission: MissionArgument,
+    out: Annotated[Path | None, typer.Option(help="Folder to write (default: runs/NAME).")] = None,
+    set_: SetOption = None,
+    force: ForceOption = False,
+    simulate: Annotated[bool, typer.Option(help="Execute the plan in MuJoCo.")] = True,
+    compare: Annotated[bool, typer.Option(help="Run the missions that this one is compared with.")] = True,
+) -> None:
+    """Plan, check and simulate a mission; write its folder and report.html."""
+    with _bad_input():
+        from bodyplan import job
+
+        with _progress() as progress:
+            result = job.run(mission, out, overrides=set_ or (), force=force, simulate=simulate, compare=compare,
+                             progress=progress)
+        _summary(result)
+    raise typer.Exit(0 if result.ok else 1)
+
+
+@app.command()
+def check(mission: Annotated[str, typer.Argument(help="A mission, or a motion saved as .npz.")], set_: SetOption = None) -> None:
+    """Plan a mission (or load a motion) and let the judge test it."""
+    with _bad_input():
+        from bodyplan.check import check as judge
+
+        motion = _motion(mission, set_)
+        report = judge(motion)
+        _print_checks(report)
+    raise typer.Exit(0 if report.ok else 1)
+
+
+@app.command()
+def export(
+    mission: Annotated[str, typer.Argument(help="A mission, or a motion saved as .npz.")],
+    to: Annotated[str, typer.Option(help="Format: csv, npz or xml (MJCF).")],
+    out: Annotated[Path | None, typer.Option(help="File to write (default: NAME.FORMAT here).")] = None,
+    set_: SetOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Write a motion in another format."""
+    with _bad_input():
+        from bodyplan.errors import InputError, UnknownNameError
+        from bodyplan.export import FORMATS, save
+
+        suffix = "." + to.lower().lstrip(".")
+        if suffix not in FORMATS:
+            raise UnknownNameError("format", to, (name[1:] for name in FORMATS))
+        target = out if out is not None else Path(Path(mission).stem + suffix)
+        if target.suffix.lower() != suffix:
+            raise InputError(f"--out {target}: does not end in {suffix}.")
+        if target.exists() and not force:
+            raise InputError(f"{target}: exists already; choose another place with --out, or --force to replace it.")
+        typer.echo(save(_motion(mission, set_), target))
+
+
+@app.command()
+def missions(
+    name: Annotated[str | None, typer.Argument(help="Print this mission's file, to copy and change.")] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the options of every kind as JSON Schema.")] = False,
+) -> None:
+    """List the ready missions, or print one."""
+    with _bad_input():
+        from bodyplan.errors import UnknownNameError
+        from bodyplan.missions import load_mission, ready_missions
+
+        if schema:
+            import json
+
+            from bodyplan.missions.schema import json_schema
+
+            typer.echo(json.dumps(json_schema(), indent=2))
+            return
+        ready = ready_missions()
+        if name is not None:
+            if name not in ready:
+                raise UnknownNameError("mission", name, ready)
+            typer.echo(ready[name], nl=False)
+            return
+        _table(["mission", "what it is"], [[n, load_mission(n).title] for n in ready])
+        typer.echo("bodyplan missions NAME prints one: save it as my.toml, change it, and bodyplan run my.toml")
+
+
+@app.command()
+def robots() -> None:
+    """List the robots that a mission can name, with their options."""
+    with _bad_input():
+        import inspect
+
+        from bodyplan.missions.schema import ROBOTS
+
+        rows = []
+        for kind, (builder, units) in ROBOTS.items():
+            about = (inspect.getdoc(builder) or "").split("\n")[0]
+            options = [
+                f"{p.name}{f' [{units[p.name]}]' if p.name in units else ''}"
+                + ("" if p.default is inspect.Parameter.empty else f" = {p.default}")
+                for p in inspect.signature(builder).parameters.values()
+            ]
+            rows.append([kind, about, ", ".join(options)])
+        _table(["kind", "what it is", "options"], rows)
+
+
+def _motion(mission: str, overrides: list[str] | None) -> Motion:
+    from bodyplan.errors import InputError
+
+    if mission.endswith(".npz"):
+        from bodyplan.export import load
+
+        if overrides:
+            raise InputError("--set: a saved motion cannot be changed; give its mission instead.")
+        return load(mission)
+    from bodyplan.job import plan_mission
+    from bodyplan.missions import load_mission
+
+    loaded: Mission = load_mission(mission, overrides or ())
+    return plan_mission(loaded)
+
+
+@contextmanager
+def _bad_input() -> Iterator[None]:
+    """Errors of the user's making end with one message and exit code 2."""
+    from bodyplan.errors import BodyplanError
+
+    try:
+        yield
+    except BodyplanError as error:
+        typer.echo(f"error: {error}", err=True)
+        raise typer.Exit(2) from None
+    except BrokenPipeError:
+        raise typer.Exit(0) from None
+    except OSError as error:
+        typer.echo(f"error: {error.strerror or error}: {error.filename or ''}".rstrip(": "), err=True)
+        raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        typer.echo("stopped; nothing was written", err=True)
+        raise typer.Exit(130) from None
+
+
+@contextmanager
+def _progress() -> Iterator[Any]:
+    """A progress bar on a terminal, one line a step elsewhere."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        said: list[str] = []
+
+        def say(step: str, part: float) -> None:
+            if step not in said:
+                said.append(step)
+                typer.echo(f"{step} ...", err=True)
+
+        yield say
+        return
+    columns = TextColumn("{task.description:12}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def show(step: str, part: float) -> None:
+            bar.update(task, description=step, completed=part)
+
+        yield show
+
+
+def _table(header: list[str], rows: list[list[str]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for title in header:
+        table.add_column(title, overflow="fold")
+    for row in rows:
+        table.add_row(*(str(cell).replace("[", r"\[") for cell in row))
+    Console().print(table)
+
+
+def _print_checks(report: Any) -> None:
+    for line in report:
+        colour = {True: None, False: typer.colors.RED, None: typer.colors.YELLOW}[line.passed]
+        typer.secho(str(line), fg=colour)
+    failed = len(report.failures)
+    typer.secho(f"{failed} of {len(report.lines)} checks failed" if failed else f"all {len(report.lines)} checks passed",
+                bold=True)
+
+
+def _figure(value: float | None, unit: str, scale: float = 1.0, digits: int = 3) -> str:
+    return "-" if value is None else f"{value * scale:.{digits}g} {unit}".rstrip()
+
+
+def _summary(result: Result) -> None:
+    """One screen: verdict, key figures, the comparison, where the report is."""
+    outcome, plan = result.outcome, result.outcome.motion.facts
+    report, trial = outcome.report, outcome.trial
+    typer.secho(f"\n{outcome.title}", bold=True)
+    for line in report.failures:
+        typer.secho(str(line), fg=typer.colors.RED)
+    failed = len(report.failures)
+    typer.echo(f"  checks     {len(report.lines) - failed} passed, {failed} failed")
+    if "period" in plan and "advance_per_cycle" in plan:
+        typer.echo(f"  plan       {_figure(plan['advance_per_cycle'], 'mm', 1e3, 4)} a cycle of "
+                   f"{_figure(plan['period'], 's')}, {_figure(plan['speed'], 'mm/s', 1e3)}")
+    if trial is not None:
+        row = outcome.itself
+        if trial.ok:
+            ratio = "no advance planned" if row.ratio is None else f"{row.ratio:.1%} of the planned advance"
+            typer.echo(f"  physics    {ratio}, {_figure(row.speed, 'mm/s', 1e3)}, "
+                       f"peak torque {_figure(row.peak_torque, 'N m')}, "
+                       f"cost of transport {_figure(row.cost_of_transport, '')}")
+        else:
+            typer.secho(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
+        for warning in trial.warnings[:5]:
+            typer.echo(f"  warning    {warning}")
+    if outcome.others:
+        typer.echo("")
+        _table(["mission", "executed / planned", "speed"],
+               [[o.name, "-" if o.ratio is None else f"{o.ratio:.2f}", _figure(o.speed, "mm/s", 1e3)]
+                for o in (outcome.itself, *outcome.others)])
+    typer.echo(f"\n  report     {result.report}")
+
+
+def main() -> None:
+    """Entry point of the ``bodyplan`` command."""
+    # rich markup in help texts needs no colour on a pipe; typer decides by itself
+    app(prog_name="bodyplan")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
