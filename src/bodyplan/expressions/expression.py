@@ -1,0 +1,195 @@
+"""A formula of named variables: values, exact derivatives, and bounds over boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array, BoolArray, finite
+from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.expressions.intervals import Interval, IntervalMath, interval
+from bodyplan.expressions.jets import ArrayMath, Jet, fold, pairs, run
+from bodyplan.expressions.parse import CONSTANTS, FUNCTIONS, Node, parse, shown
+
+
+class Expression:
+    """A formula such as ``sin(0.5*(x+y))/15``.
+
+    ``text`` may use numbers, the names in ``variables``, pi, e, ``+ - * / **``, parentheses and the functions
+    sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs min max (angles in rad). It is parsed by
+    a whitelist and never run as code; its length, depth and constant exponents are bounded.
+
+    Constant exponents are exact (``x**2`` at 0, ``(-2)**3``, ``x**0 == 1``); a power with a variable in its
+    exponent needs a positive base. At the kink of abs, min and max, derivatives are those of one side.
+
+    Raises InputError naming the offending part of the text and what is allowed.
+    """
+
+    def __init__(self, text: str, variables: Sequence[str] = ("x", "y")) -> None:
+        names = (variables,) if isinstance(variables, str) else tuple(variables)
+        for name in names:
+            if not isinstance(name, str) or not name.isidentifier() or not name.isascii():
+                raise InputError(f"Expression.variables: {name!r} is not a name.")
+            if name in CONSTANTS or name in FUNCTIONS:
+                raise InputError(f"Expression.variables: {name!r} is already a constant or a function.")
+        if len(set(names)) != len(names):
+            raise InputError(f"Expression.variables: every name once, got {names!r}.")
+        self._text, self._variables, self._tape = text, names, parse(text, names, fold)
+
+    @property
+    def text(self) -> str:
+        """The formula as it was given."""
+        return self._text
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the variables, in the order of gradient and Hessian."""
+        return self._variables
+
+    @cached_property
+    def kinks(self) -> tuple[Expression, ...]:
+        """Formulas whose zeros are the only places where this one has no derivative though it is defined:
+        the arguments of abs and the differences of the arguments of min and max."""
+        found = []
+        for i, node in enumerate(self._tape):
+            if node.op == "abs":
+                found.append(self._part(self._tape[: node.args[0] + 1]))
+            elif node.op in ("min", "max"):
+                found.append(self._part((*self._tape[:i], Node("sub", node.args, source=node.source))))
+        return tuple(found)
+
+    def value(self, **arrays: ArrayLike) -> Array:
+        """The formula at arrays of one broadcast shape (...,), one for each variable, by name.
+
+        Raises InputError for a missing variable, and where the result (or a step to it, such as a division
+        by zero or the logarithm of a negative number) is not finite, naming the formula and the point.
+        """
+        points = self._points(arrays)
+        (value, _, _), culprit = self._run(points, 0)
+        self._check(points, np.isfinite(value), culprit)
+        return value
+
+    def jet(self, **arrays: ArrayLike) -> tuple[Array, Array, Array]:
+        """Value (...,), gradient (..., n) and Hessian (..., n, n), exact, by forward-mode differentiation.
+
+        Raises InputError as :meth:`value`, and where a derivative is not finite.
+        """
+        points = self._points(arrays)
+        jet, culprit = self._run(points, len(self._variables))
+        value, gradient, hessian = jet
+        good = (
+            np.isfinite(value) & np.isfinite(gradient).all(axis=-1) & np.isfinite(hessian).all(axis=(-2, -1))
+        )
+        self._check(points, good, culprit)
+        return jet
+
+    def jet_or_nan(self, **arrays: ArrayLike) -> tuple[Array, Array, Array]:
+        """As :meth:`jet`, with a value that is not a number (and no error) where the formula is undefined."""
+        return self._run(self._points(arrays), len(self._variables))[0]
+
+    def enclosure(self, **boxes: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array, Array]:
+        """Bounds over boxes: ``x=(low, high)``, one pair of arrays (...,) for each variable.
+
+        Returns (lowest, highest) stacked in front: of the value (2, ...), the gradient (2, ..., n) and the
+        Hessian (2, ..., n, n). They hold (widened for rounding) but need not be tight; infinite where nothing
+        is known: at a kink for the Hessian, at a pole or the edge of the domain for all. Where the formula
+        is defined nowhere in a box, the value has the empty bounds (inf, -inf).
+        """
+        ends = {f"{name}{end}": box[end] for name, box in boxes.items() for end in (0, 1)}
+        flat = self._points(ends, [f"{name}{end}" for name in self._variables for end in (0, 1)])
+        shape = flat[0].shape if flat else ()
+        n = len(self._variables)
+        math = IntervalMath()
+        with np.errstate(all="ignore"):
+            variables = [Interval(low, high) for low, high in zip(flat[::2], flat[1::2], strict=True)]
+            last = run(self._tape, _seeds(variables, n), math)[-1]
+        parts = []
+        for end, outwards in (("lo", -1.0), ("hi", 1.0)):
+            value, gradient, hessian = _dense(last, shape, n, partial(_end, end))
+            for part in (value, gradient, hessian):
+                part += outwards * (1e-12 * np.abs(part) + 1e-300)
+            value[np.broadcast_to(math.empty, shape)] = -outwards * np.inf
+            parts.append((value, gradient, hessian))
+        return tuple(np.stack(pair) for pair in zip(*parts, strict=True))  # type: ignore[return-value]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and (self.text, self.variables) == (other.text, other.variables)
+
+    def __hash__(self) -> int:
+        return hash((self._text, self._variables))
+
+    def __repr__(self) -> str:
+        return f"Expression({self._text!r}, variables={self._variables!r})"
+
+    def _part(self, tape: tuple[Node, ...]) -> Expression:
+        part = object.__new__(Expression)
+        part._text, part._variables, part._tape = tape[-1].source, self._variables, tape
+        return part
+
+    def _points(self, arrays: Mapping[str, ArrayLike], names: Sequence[str] | None = None) -> list[Array]:
+        """The given arrays in the order of ``names``, broadcast to one shape."""
+        names = self._variables if names is None else names
+        for name in arrays:
+            if name not in names:
+                raise UnknownNameError("variable", name, names, f"Expression {shown(self._text)}")
+        missing = [name for name in names if name not in arrays]
+        if missing:
+            raise InputError(f"Expression {shown(self._text)}: no value for {', '.join(missing)}.")
+        given = [finite(arrays[name], f"Expression {shown(self._text)}, {name}") for name in names]
+        try:
+            return list(np.broadcast_arrays(*given))
+        except ValueError as error:
+            shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(names, given, strict=True))
+            raise InputError(f"Expression {shown(self._text)}: shapes do not broadcast: {shapes}.") from error
+
+    def _run(self, points: list[Array], n: int) -> tuple[tuple[Array, Array, Array], str]:
+        """Value, gradient and Hessian in n variables (0: none), and the first operation that failed."""
+        math = ArrayMath()
+        with np.errstate(all="ignore"):
+            last = run(self._tape, _seeds(points, n), math)[-1]
+        shape = points[0].shape if points else ()
+        value, gradient, hessian = _dense(last, shape, n, lambda p: p)
+        if math.undefined is not None:
+            value[np.broadcast_to(math.undefined, shape)] = np.nan
+        return (value, gradient, hessian), math.culprit
+
+    def _check(self, points: list[Array], good: BoolArray, culprit: str) -> None:
+        if good.all():
+            return
+        index = tuple(np.argwhere(~good)[0])
+        at = ", ".join(
+            f"{name} = {float(p[index])!r}" for name, p in zip(self._variables, points, strict=True)
+        )
+        part = f" (because of {shown(culprit)})" if culprit else ""
+        raise InputError(
+            f"Expression {shown(self._text)}: not finite, or without derivatives, at {at}{part}."
+        )
+
+
+def _seeds(variables: Sequence[Any], n: int) -> list[Jet]:
+    """The jets of the variables themselves: unit gradients."""
+    curved = (None,) * (n * (n + 1) // 2)
+    return [Jet(v, tuple(1.0 if i == j else None for j in range(n)), curved) for i, v in enumerate(variables)]
+
+
+def _dense(
+    jet: Jet, shape: tuple[int, ...], n: int, part: Callable[[Any], Any]
+) -> tuple[Array, Array, Array]:
+    """The arrays of a jet; ``part`` maps a number of its kind to an array."""
+    value, gradient, hessian = np.empty(shape), np.zeros((*shape, n)), np.zeros((*shape, n, n))
+    value[...] = part(jet.value)
+    for i, g in enumerate(jet.gradient):
+        if g is not None:
+            gradient[..., i] = part(g)
+    for (i, j), h in zip(pairs(n), jet.hessian, strict=True):
+        if h is not None:
+            hessian[..., i, j] = hessian[..., j, i] = part(h)
+    return value, gradient, hessian
+
+
+def _end(end: str, number: Any) -> Any:
+    return getattr(interval(number), end)
