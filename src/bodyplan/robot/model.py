@@ -27,7 +27,7 @@ from bodyplan.robot.elements import (
     joint_kinds,
     joint_properties,
 )
-from bodyplan.robot.kernels import forward_kernel
+from bodyplan.robot.forward_kernel import forward_kernel
 from bodyplan.robot.poses import Poses
 from bodyplan.robot.reach import Reach, reach
 from bodyplan.robot.rows import arc_matrices, row_matrices
@@ -188,8 +188,8 @@ class Robot:
         wxyz), broadcast against ``q``; the identity when None.
         """
         shape, flat, pose = batch.flatten(self.vector(q), base)
-        out = np.empty((len(flat), len(self.frames), 7))
-        batch.raise_if_bad(forward_kernel(flat, pose, *self._tables, out))
+        out = np.empty((len(flat) * len(self.frames), 7))
+        batch.raise_if_bad(forward_kernel(len(flat), flat.reshape(-1), pose, *self._tables, out))
         return Poses(out.reshape(*shape, len(self.frames), 7), self.frames, self._frame_of)
 
     def velocity_model(self, q: ArrayLike | Mapping[str, ArrayLike]) -> tuple[Array, Array]:

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.robot import batch
-from bodyplan.robot.kernels import jacobian_kernel
+from bodyplan.robot.jacobian_kernel import jacobian_kernel
 from bodyplan.robot.tables import Paths, Tables
-from bodyplan.spatial.rotations import hat
+from bodyplan.spatial.twists import adjoint_inverse
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +20,8 @@ class Reach:
 
     * ``positions`` (..., C, 3) m and ``rotations`` (..., C, 3, 3), in the world of the base pose;
     * ``twists`` (..., K, 6): body-fixed (v, omega) of a target per unit rate of one joint. Target c has rows
-      ``offsets[c]:offsets[c + 1]``, one for each joint between the base and it, and ``joints`` (K,) is the joint
-      of every row. :meth:`jacobian` is one target's (..., 6, k).
+      ``offsets[c]:offsets[c + 1]``, one for each joint between the base and it, and ``joints`` (K,) is the
+      joint of every row. :meth:`jacobian` is one target's (..., 6, k).
     """
 
     positions: Array
@@ -44,29 +44,20 @@ class Reach:
         return out
 
     def carried(self) -> Array:
-        """(..., 6 C, 6): twists of targets rigidly attached to the base per unit base twist (P), for a base at
-        the identity pose."""
-        Rt = self.rotations.swapaxes(-1, -2)
-        out = np.zeros((*Rt.shape[:-2], 6, 6))
-        out[..., :3, :3] = out[..., 3:, 3:] = Rt
-        out[..., :3, 3:] = -Rt @ hat(self.positions)
-        return out.reshape(*Rt.shape[:-3], -1, 6)
+        """(..., 6 C, 6): twists of targets rigidly attached to the base per unit base twist (P), for a base
+        at the identity pose."""
+        each = adjoint_inverse(self.positions, self.rotations)
+        return each.reshape(*each.shape[:-3], 6 * each.shape[-3], 6)
 
 
 def reach(tables: Tables, paths: Paths, q: Array, base: ArrayLike | None) -> Reach:
     """Poses and joint twists of the targets of ``paths`` at ``q`` (..., n)."""
     shape, flat, pose = batch.flatten(q, base)
-    B, C, K = len(flat), len(paths.starts) - 1, len(paths.joints)
-    position, rotation, twist = np.empty((B, C, 3)), np.empty((B, C, 3, 3)), np.empty((B, K, 6))
-    batch.raise_if_bad(
-        jacobian_kernel(
-            flat, pose, *tables, paths.starts, paths.steps, paths.offsets, position, rotation, twist
-        )
-    )
-    return Reach(
-        position.reshape(*shape, C, 3),
-        rotation.reshape(*shape, C, 3, 3),
-        twist.reshape(*shape, K, 6),
-        paths.offsets,
-        paths.joints,
-    )
+    C, K = len(paths.offsets) - 1, len(paths.joints)
+    # one configuration is a kernel of its own; the kernels take the batch as one axis
+    size, lead = (len(flat), (len(flat),)) if shape else (True, ())
+    position, rotation, twist = np.empty((*lead, C, 3)), np.empty((*lead, C, 3, 3)), np.empty((*lead, K, 6))
+    batch.raise_if_bad(jacobian_kernel(size, flat.reshape(-1), pose, *tables, paths.ints, position, rotation, twist))
+    if len(shape) > 1:
+        position, rotation, twist = (a.reshape(*shape, *a.shape[1:]) for a in (position, rotation, twist))
+    return Reach(position, rotation, twist, paths.offsets, paths.joints)

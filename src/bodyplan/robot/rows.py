@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError
 from bodyplan.spatial.coefficients import coefficients, slopes
-from bodyplan.spatial.rotations import hat, rotation_exp
+from bodyplan.spatial.rotations import rotation_exp
+from bodyplan.spatial.twists import adjoint_inverse
 
 
 def row_transform(theta: ArrayLike, d: ArrayLike, a: ArrayLike, epsilon: ArrayLike) -> tuple[Array, Array]:
@@ -45,7 +46,7 @@ def row_matrices(theta: ArrayLike, d: ArrayLike, a: ArrayLike, epsilon: ArrayLik
     # B, rows of omega
     E[..., 3, 3] = 1.0
     E[..., 4, 0], E[..., 5, 0] = se, ce
-    return _carry(position, R), E
+    return adjoint_inverse(position, R), E
 
 
 def arc_transform(length: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> tuple[Array, Array]:
@@ -76,16 +77,7 @@ def arc_matrices(length: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> tuple[A
     E[..., 3, 0], E[..., 3, 1] = B * y, -B * p
     E[..., 4, 0], E[..., 5, 1] = 1.0 - C * y * y, 1.0 - C * p * p
     E[..., 4, 1] = E[..., 5, 0] = C * p * y
-    return _carry(position, R), E
-
-
-def _carry(position: Array, R: Array) -> Array:
-    """D = [R^T, -R^T [position]; 0, R^T]: the body-fixed twist of a rigidly attached frame."""
-    Rt = np.swapaxes(R, -1, -2)
-    D = np.zeros((*position.shape[:-1], 6, 6))
-    D[..., :3, :3] = D[..., 3:, 3:] = Rt
-    D[..., :3, 3:] = -Rt @ hat(position)
-    return D
+    return adjoint_inverse(position, R), E
 
 
 def _together(**values: ArrayLike) -> tuple[Array, ...]:

@@ -1,7 +1,11 @@
 """A robot's chains as flat number tables: what the kernels read instead of Python objects.
 
 Frame 0 is the base; frame e > 0 is the one that element e ends in, so that a parent always comes first.
-Variables of an element are numbered 0..3: theta, d, a, epsilon of a row; pitch, yaw of an arc.
+Variables of an element are numbered 0..3: theta, d, a, epsilon of a row; pitch, yaw of an arc. A *drive* is one
+variable of one element that follows a joint.
+
+Kernels take all tables of a kind in one flat array with the sizes in front: every array that is passed to a
+compiled function costs a call some 50 ns.
 """
 
 from __future__ import annotations
@@ -10,55 +14,60 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bodyplan.arrays import Array, IntArray, frozen
 from bodyplan.robot.elements import Arc, Chain, Joint, WheelRadius
 
+# element_i: kind, parent frame, drive of variable 0..3 (-1: constant)
+# element_f: constants 0..3 (an arc has its length in 2), then cosine and sine of theta and of epsilon, then those
+#            of their halves
+ELEMENT_I, ELEMENT_F = 6, 12
+# drive_i: joint, law, kind of variable;  drive_f: value = f0 + f1 q (LINEAR) or f0 + f1 cos(q/2) (WHEEL)
+DRIVE_I, DRIVE_F = 3, 2
+# step: what to do, element, column of variable 0..3 (-1: none), 1 where this is the column's first use
+STEP = 10
+
 ROW, ARC = 1, 2
 LINEAR, WHEEL = 0, 1
+ROW_ANGLE, OTHER = 1, 0
+# what to do in a step: nothing but constants; one revolute theta; any drives; an arc
+FIXED, REVOLUTE, GENERAL, BEND = 0, 1, 2, 3
 COS_30 = float(np.sqrt(0.75))
 
 
 class Tables(NamedTuple):
-    """Number tables of all elements and drives; see the comments for the columns."""
+    """All elements and drives. ``ints``: F, V, n, then element_i (F, 6), drive_i (V, 3). ``floats``: element_f
+    (F, 12), drive_f (V, 2)."""
 
-    element_i: IntArray  # (F, 6): kind, parent frame, drive of variable 0..3 (-1: constant)
-    element_f: Array  # (F, 4): constant value of variable 0..3; an arc has its length in column 2
-    drive_i: IntArray  # (V, 4): joint, law, element, variable
-    drive_f: Array  # (V, 2): value = f0 + f1 q (LINEAR) or f0 + f1 cos(q/2) (WHEEL)
+    ints: IntArray
+    floats: Array
 
 
 class Paths(NamedTuple):
-    """The ways from some target frames back to the base, and which joint columns they need."""
+    """The ways from C target frames back to the base, and the K joint columns they need.
 
-    starts: IntArray  # (C + 1,): steps of target c are starts[c]:starts[c + 1]
-    steps: (
-        IntArray  # (S, 9): element, column of variable 0..3 (-1: constant), 1 where it is the column's first
-    )
-    offsets: IntArray  # (C + 1,): columns of target c are offsets[c]:offsets[c + 1]
-    joints: IntArray  # (K,): joint of every column, ascending within a target
+    ``ints``: C, steps in all, K, most columns of a target, then starts (C + 1,), offsets (C + 1,), steps (S, 10):
+    target c has the steps starts[c]:starts[c + 1] and the columns offsets[c]:offsets[c + 1].
+    ``joints`` (K,): joint of every column, ascending within a target.
+    """
 
-
-def _frozen_int(values: Any, shape: tuple[int, ...]) -> IntArray:
-    out: NDArray[np.int64] = np.array(values, dtype=np.int64).reshape(shape)
-    out.flags.writeable = False
-    return out
+    ints: IntArray
+    offsets: IntArray
+    joints: IntArray
 
 
 def build_tables(chains: tuple[Chain, ...], frames: tuple[str, ...], column: Mapping[str, int]) -> Tables:
     """Tables of validated chains; ``column`` is the index of every joint in q."""
     frame_of = {name: i for i, name in enumerate(frames)}
     element_i: list[list[int]] = [[0, -1, -1, -1, -1, -1]]
-    element_f: list[list[float]] = [[0.0] * 4]
+    element_f: list[list[float]] = [[0.0] * ELEMENT_F]
     drive_i: list[list[int]] = []
     drive_f: list[list[float]] = []
     for chain in chains:
         parent = frame_of[chain.parent]
         for element in chain.elements:
-            e = len(element_i)
             ints = [ARC if isinstance(element, Arc) else ROW, parent, -1, -1, -1, -1]
-            floats = [0.0, 0.0, element.length, 0.0] if isinstance(element, Arc) else [0.0] * 4
+            values = [0.0, 0.0, element.length, 0.0] if isinstance(element, Arc) else [0.0] * 4
             for k, field in enumerate(element.VARIABLES):
                 value = getattr(element, field)
                 if isinstance(value, Joint):
@@ -66,25 +75,29 @@ def build_tables(chains: tuple[Chain, ...], frames: tuple[str, ...], column: Map
                 elif isinstance(value, WheelRadius):
                     law, joint, numbers = WHEEL, value.joint.name, [value.rubber, value.link * COS_30]
                 else:
-                    floats[k] = value
+                    values[k] = value
                     continue
                 ints[2 + k] = len(drive_i)
-                drive_i.append([column[joint], law, e, k])
+                turns = ROW_ANGLE if field in element.ANGLES and not isinstance(element, Arc) else OTHER
+                drive_i.append([column[joint], law, turns])
                 drive_f.append(numbers)
+            theta, epsilon = (values[0], values[3]) if not isinstance(element, Arc) else (0.0, 0.0)
+            trig = [f(h * x) for h in (1.0, 0.5) for x in (theta, epsilon) for f in (np.cos, np.sin)]
             element_i.append(ints)
-            element_f.append(floats)
-            parent = e
+            element_f.append([*values, *trig])
+            parent = len(element_i) - 1
     return Tables(
-        _frozen_int(element_i, (-1, 6)),
-        frozen(element_f),
-        _frozen_int(drive_i, (-1, 4)),
-        frozen(np.reshape(drive_f, (-1, 2))),
+        _joined([len(element_i), len(drive_i), len(column)], element_i, drive_i),
+        frozen(np.concatenate([np.ravel(element_f), np.ravel(drive_f)])),
     )
 
 
 def build_paths(tables: Tables, targets: tuple[int, ...]) -> Paths:
     """Paths from ``targets`` (frame numbers) to the base; a joint that drives several variables on one path
     has one column there."""
+    F, V = (int(i) for i in tables.ints[:2])
+    element_i = tables.ints[3 : 3 + F * ELEMENT_I].reshape(F, ELEMENT_I)
+    drive_i = tables.ints[3 + F * ELEMENT_I :].reshape(V, DRIVE_I)
     starts, offsets = [0], [0]
     steps: list[list[int]] = []
     joints: list[int] = []
@@ -93,28 +106,46 @@ def build_paths(tables: Tables, targets: tuple[int, ...]) -> Paths:
         frame = target
         while frame > 0:
             elements.append(frame)
-            frame = int(tables.element_i[frame, 1])
-        drives = [int(v) for e in elements for v in tables.element_i[e, 2:] if v >= 0]
-        columns = {
-            j: offsets[-1] + i for i, j in enumerate(sorted({int(tables.drive_i[v, 0]) for v in drives}))
-        }
+            frame = int(element_i[frame, 1])
+        drives = [int(v) for e in elements for v in element_i[e, 2:] if v >= 0]
+        names = sorted({int(drive_i[v, 0]) for v in drives})
+        columns = {joint: i for i, joint in enumerate(names)}
         met: set[int] = set()
         for e in elements:
             slots, firsts = [-1] * 4, [0] * 4
-            # the order in which the backward recursion writes them
+            # in the order in which the recursion meets them: from the far end of the element
             for k in (3, 2, 1, 0):
-                v = int(tables.element_i[e, 2 + k])
+                v = int(element_i[e, 2 + k])
                 if v >= 0:
-                    slots[k] = columns[int(tables.drive_i[v, 0])]
+                    slots[k] = columns[int(drive_i[v, 0])]
                     firsts[k] = int(slots[k] not in met)
                     met.add(slots[k])
-            steps.append([e, *slots, *firsts])
+            steps.append([_what(element_i[e], drive_i, slots, firsts), e, *slots, *firsts])
         starts.append(len(steps))
         offsets.append(offsets[-1] + len(columns))
-        joints.extend(columns)
+        joints.extend(names)
+    most = int(max(np.diff(offsets), default=0))
     return Paths(
-        _frozen_int(starts, (-1,)),
-        _frozen_int(steps, (-1, 9)),
-        _frozen_int(offsets, (-1,)),
-        _frozen_int(joints, (-1,)),
+        _joined([len(targets), len(steps), len(joints), most], starts, offsets, steps),
+        _frozen_int(offsets),
+        _frozen_int(joints),
     )
+
+
+def _what(element: IntArray, drive_i: IntArray, slots: list[int], firsts: list[int]) -> int:
+    if element[0] == ARC:
+        return BEND
+    if max(slots) < 0:
+        return FIXED
+    only_theta = slots[0] >= 0 and max(slots[1:]) < 0
+    return REVOLUTE if only_theta and firsts[0] and drive_i[element[2], 1] == LINEAR else GENERAL
+
+
+def _joined(*parts: Any) -> IntArray:
+    return _frozen_int(np.concatenate([np.ravel(np.array(part, dtype=np.int64)) for part in parts]))
+
+
+def _frozen_int(values: Any) -> IntArray:
+    out: IntArray = np.array(values, dtype=np.int64)
+    out.flags.writeable = False
+    return out

@@ -6,88 +6,61 @@
     D = (1 - A/(2 B))/x^2
 
 A and B have no cancellation when written with the half angle, B = (sin(x/2)/(x/2))^2 / 2. The closed forms of
-C, D and of dB lose digits near 0: below z = x^2 = 1 their Taylor polynomials are used (truncation < 1e-17).
-The polynomials take floats and arrays, in Python and inside Numba kernels.
+C, D and of dB/dx lose digits near 0: below z = x^2 = 1 their Taylor polynomials are used (truncation < 1e-17).
+What takes a ``Number`` works on floats and arrays in Python and on floats inside Numba kernels.
 """
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numba.extending import register_jitable
 
 from bodyplan.arrays import Array
 
-#: the Taylor polynomials hold for z = angle^2 below this
+Number = TypeVar("Number", float, Array)
+
+#: the Taylor polynomials hold for z = x^2 below this
 SERIES_BELOW = 1.0
 
 
-@register_jitable  # type: ignore[no-untyped-decorator]
-def c_series(z):  # type: ignore[no-untyped-def]
-    """C = (x - sin x)/x^3 for z = x^2 < 1: sum of (-z)^k/(2k + 3)!."""
-    return (1.0 / 6.0) * (
-        1.0
-        - z
-        * (1.0 / 20.0)
-        * (
-            1.0
-            - z
-            * (1.0 / 42.0)
-            * (
-                1.0
-                - z
-                * (1.0 / 72.0)
-                * (
-                    1.0
-                    - z
-                    * (1.0 / 110.0)
-                    * (1.0 - z * (1.0 / 156.0) * (1.0 - z * (1.0 / 210.0) * (1.0 - z * (1.0 / 272.0))))
-                )
-            )
-        )
-    )
+@register_jitable
+def c_series(z: Number) -> Number:
+    """C for z = x^2 < 1: the sum of (-z)^k/(2k + 3)!, k = 0, 1, ..."""
+    p = 1.0 - z * (1.0 / 210.0) * (1.0 - z * (1.0 / 272.0))
+    p = 1.0 - z * (1.0 / 72.0) * (1.0 - z * (1.0 / 110.0) * (1.0 - z * (1.0 / 156.0) * p))
+    return (1.0 / 6.0) * (1.0 - z * (1.0 / 20.0) * (1.0 - z * (1.0 / 42.0) * p))
 
 
-@register_jitable  # type: ignore[no-untyped-decorator]
-def b_slope_series(z):  # type: ignore[no-untyped-def]
-    """dB/dx / x = (A - 2 B)/x^2 for z = x^2 < 1: sum of 2 (-1)^(k+1) (k+1) z^k/(2k + 4)!."""
-    return (-1.0 / 12.0) * (
-        1.0
-        - z
-        * (1.0 / 15.0)
-        * (
-            1.0
-            - z
-            * (3.0 / 112.0)
-            * (
-                1.0
-                - z
-                * (2.0 / 135.0)
-                * (
-                    1.0
-                    - z
-                    * (5.0 / 528.0)
-                    * (1.0 - z * (3.0 / 455.0) * (1.0 - z * (7.0 / 1440.0) * (1.0 - z * (4.0 / 1071.0))))
-                )
-            )
-        )
-    )
+@register_jitable
+def b_slope_series(z: Number) -> Number:
+    """dB/dx / x = (A - 2 B)/x^2 for z = x^2 < 1: the sum of 2 (-1)^(k+1) (k+1) z^k/(2k + 4)!."""
+    p = 1.0 - z * (7.0 / 1440.0) * (1.0 - z * (4.0 / 1071.0))
+    p = 1.0 - z * (2.0 / 135.0) * (1.0 - z * (5.0 / 528.0) * (1.0 - z * (3.0 / 455.0) * p))
+    return (-1.0 / 12.0) * (1.0 - z * (1.0 / 15.0) * (1.0 - z * (3.0 / 112.0) * p))
 
 
-def _d_series(z: Array) -> Array:
-    """D for z < 1: sum of |B_2n|/(2n)! z^(n-1) with the Bernoulli numbers B_2n."""
-    terms = (
-        1 / 12,
-        1 / 720,
-        1 / 30240,
-        1 / 1209600,
-        1 / 47900160,
-        691 / 1307674368000,
-        1 / 74724249600,
-        3617 / 10670622842880000,
-        43867 / 5109094217170944000,
-        174611 / 802857662698291200000,
-    )
-    return np.polynomial.polynomial.polyval(z, np.array(terms))
+@register_jitable
+def exponential(z: float) -> tuple[float, float, float, float]:
+    """(cos(x/2), sin(x/2)/x, A, B) at x = sqrt(z): what a unit quaternion and an arc need."""
+    h = 0.5 * math.sqrt(z)
+    cosine = math.cos(h)
+    # below 1e-150 squares underflow; there sin(h)/h is 1 to the last digit
+    ratio = math.sin(h) / h if h > 1e-150 else 1.0
+    return cosine, 0.5 * ratio, ratio * cosine, 0.5 * ratio * ratio
+
+
+@register_jitable
+def slope_coefficients(z: float, a: float, b: float) -> tuple[float, float, float]:
+    """(C, dA/dx / x, dB/dx / x) at x = sqrt(z), given A and B."""
+    if z < SERIES_BELOW:
+        c, b1 = c_series(z), b_slope_series(z)
+    else:
+        c, b1 = (1.0 - a) / z, (a - 2.0 * b) / z
+    return c, c - b, b1
 
 
 def sinc(x: Array) -> Array:
@@ -99,26 +72,41 @@ def sinc(x: Array) -> Array:
 def coefficients(x: Array) -> tuple[Array, Array, Array]:
     """(A, B, C) at angles ``x`` (...,) rad."""
     a, b = sinc(x), 0.5 * sinc(0.5 * x) ** 2
-    z = x * x
-    small = z < SERIES_BELOW
-    c = np.where(small, c_series(np.where(small, z, 0.0)), (1.0 - a) / np.where(small, 1.0, z))
-    return a, b, c
+    return a, b, _select(x * x, c_series, 1.0 - a)
 
 
 def slopes(x: Array) -> tuple[Array, Array]:
     """(dA/dx / x, dB/dx / x) at angles ``x`` (...,) rad: C - B and (A - 2 B)/x^2."""
     a, b, c = coefficients(x)
-    z = x * x
-    small = z < SERIES_BELOW
-    closed = (a - 2.0 * b) / np.where(small, 1.0, z)
-    return c - b, np.where(small, b_slope_series(np.where(small, z, 0.0)), closed)
+    return c - b, _select(x * x, b_slope_series, a - 2.0 * b)
 
 
 def inverse_coefficient(x: Array) -> Array:
     """D at angles ``x`` (...,) rad, |x| < 2 pi."""
     a, b, _ = coefficients(x)
-    z = x * x
+    return _select(x * x, _d_series, 1.0 - 0.5 * a / b)
+
+
+def _select(z: Array, series: Callable[[Array], Array], numerator: Array) -> Array:
+    """``series(z)`` below z = 1, ``numerator / z`` above."""
     small = z < SERIES_BELOW
-    # A/(2B) = (x/2) cot(x/2), and near x = pi this form stays regular
-    closed = (1.0 - 0.5 * a / b) / np.where(small, 1.0, z)
-    return np.where(small, _d_series(np.where(small, z, 0.0)), closed)
+    return np.where(small, series(np.where(small, z, 0.0)), numerator / np.where(small, 1.0, z))
+
+
+def _d_series(z: Array) -> Array:
+    """D for z < 1: the sum of |B_2n|/(2n)! z^(n-1) with the Bernoulli numbers B_2n."""
+    return np.asarray(np.polynomial.polynomial.polyval(z, np.array(_D_TERMS)))
+
+
+_D_TERMS = (
+    1 / 12,
+    1 / 720,
+    1 / 30240,
+    1 / 1209600,
+    1 / 47900160,
+    691 / 1307674368000,
+    1 / 74724249600,
+    3617 / 10670622842880000,
+    43867 / 5109094217170944000,
+    174611 / 802857662698291200000,
+)
