@@ -111,7 +111,8 @@ class Expression:
         for end, outwards in (("lo", -1.0), ("hi", 1.0)):
             value, gradient, hessian = _dense(last, shape, n, partial(_end, end))
             for part in (value, gradient, hessian):
-                part += outwards * (1e-12 * np.abs(part) + 1e-300)
+                wider = part + outwards * (1e-12 * np.where(np.isfinite(part), np.abs(part), 0.0) + 1e-300)
+                part[...] = np.where(np.isfinite(part), wider, outwards * np.inf)
             value[np.broadcast_to(math.empty, shape)] = -outwards * np.inf
             parts.append((value, gradient, hessian))
         return tuple(np.stack(pair) for pair in zip(*parts, strict=True))  # type: ignore[return-value]

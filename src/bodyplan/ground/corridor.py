@@ -49,7 +49,7 @@ class Corridor(Ground):
         half, low, top = 0.5 * self.width, self.floor, self.floor + self.wall_height
         edges = [(-half, low, half, low), (half, low, half, top), (half, top, np.inf, top)]
         inside = (z < low) | ((y > half) & (z < top))
-        return np.where(inside, -1.0, 1.0) * distance_to_edges(y, z, edges)
+        return np.asarray(np.where(inside, -1.0, 1.0) * distance_to_edges(y, z, edges))
 
     def solids(self, low: ArrayLike, high: ArrayLike) -> list[Solid]:
         """The floor as a plane, and a box for each wall, as thick as the corridor is wide or wider."""

@@ -55,10 +55,10 @@ class Profile(Ground):
     def ceiling_height(self, x: ArrayLike) -> Array:
         """Ceiling z (...,) in m at x (...,); inf where it is open."""
         at = finite(x, "x")
-        return np.minimum(*_both_sides(at, self._ceiling_x, self._ceiling_z))
+        return np.asarray(np.minimum(*_both_sides(at, self._ceiling_x, self._ceiling_z)))
 
     def _jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        z = np.maximum(*_both_sides(x, self._floor_x, self._floor_z))
+        z = np.asarray(np.maximum(*_both_sides(x, self._floor_x, self._floor_z)))
         return z, np.zeros((*z.shape, 2)), np.zeros((*z.shape, 2, 2))
 
     def clearance(self, points: ArrayLike) -> Array:
@@ -68,7 +68,7 @@ class Profile(Ground):
         x, z = p[..., 0], p[..., 2]
         edges = _edges(self._floor_x, self._floor_z) + _edges(self._ceiling_x, self._ceiling_z)
         inside = (z < self.height(p)) | (z > self.ceiling_height(x))
-        return np.where(inside, -1.0, 1.0) * distance_to_edges(x, z, edges)
+        return np.asarray(np.where(inside, -1.0, 1.0) * distance_to_edges(x, z, edges))
 
     def solids(self, low: ArrayLike, high: ArrayLike) -> list[Solid]:
         """A box for each level of floor and ceiling between the x of ``low`` and ``high``."""
