@@ -180,16 +180,9 @@ def _add_servos(spec: Any, robot: Robot, drives: Drives, servo: Servo, dt: float
         mine = np.flatnonzero(drives.joint == column)
         names, scales = [drives.names[i] for i in mine], drives.scale[mine]
         for name, scale in zip(names[1:], scales[1:], strict=True):
-            spec.add_equality(
-                name=name,
-                type=mj.mjtEq.mjEQ_JOINT,
-                objtype=mj.mjtObj.mjOBJ_JOINT,
-                name1=name,
-                name2=names[0],
-                data=[0.0, scale / scales[0], *[0.0] * 10],
-                solref=[2.0 * dt, 1.0],
-                solimp=[0.99, 0.999, 1e-3, 0.5, 2.0],
-            )
+            tie = spec.add_equality(name=name, type=mj.mjtEq.mjEQ_JOINT, name1=name, name2=names[0])
+            tie.data[:5] = [0.0, scale / scales[0], 0.0, 0.0, 0.0]
+            tie.solref, tie.solimp = [2.0 * dt, 1.0], [0.99, 0.999, 1e-3, 0.5, 2.0]
         if joint.name not in gains:
             continue
         columns.append(column)

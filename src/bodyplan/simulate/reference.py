@@ -63,13 +63,10 @@ class Reference:
         first, last = self._sample(0.0), self._sample(self.period)
         # world motion of one cycle: last = step * first
         turn = multiply(last[3:], conjugate(first[3:]))
-        shift = last[:3] - rotate(turn, first[:3])
-        for _ in range(abs(int(cycle))):
-            if cycle > 0:
-                pose = np.concatenate([shift + rotate(turn, pose[:3]), multiply(turn, pose[3:])])
-            else:
-                back = conjugate(turn)
-                pose = np.concatenate([rotate(back, pose[:3] - shift), multiply(back, pose[3:])])
+        step = np.concatenate([last[:3] - rotate(turn, first[:3]), turn])
+        if cycle < 0:
+            step = np.concatenate([-rotate(conjugate(turn), step[:3]), conjugate(turn)])
+        pose = _compose(_power(step, abs(int(cycle))), pose)
         return np.concatenate([pose[:3], canonical(pose[3:])])
 
     def _within(self, phase: Array) -> tuple[Array, Array]:
@@ -87,3 +84,35 @@ class Reference:
         a, b = base[i], base[i + 1]
         step = quaternion_log(multiply(conjugate(a[3:]), b[3:]))
         return np.concatenate([a[:3] + s * (b[:3] - a[:3]), multiply(a[3:], quaternion_exp(s * step))])
+
+
+def _compose(a: Array, b: Array) -> Array:
+    """The rigid motion (7,) b followed by a."""
+    return np.concatenate([a[:3] + rotate(a[3:], b[:3]), multiply(a[3:], b[3:])])
+
+
+def _power(step: Array, times: int) -> Array:
+    """The rigid motion ``step`` done so many times over, by repeated squaring."""
+    out = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    while times:
+        if times & 1:
+            out = _compose(step, out)
+        step, times = _compose(step, step), times >> 1
+    return out
+
+
+def region(reference: Reference, cycles: int) -> tuple[Array, Array]:
+    """A box (3,), (3,) m that holds the planned robot in so many cycles, with room around it."""
+    motion = reference.motion
+    positions = motion.poses().positions
+    reach = float(np.max(np.linalg.norm(positions - motion.base[:, None, :3], axis=-1), initial=0.0))
+    size = max(
+        (c.radius + float(np.abs((*c.start, *c.end, *c.half)).max()) for c in motion.robot.contacts),
+        default=0.0,
+    )
+    path = motion.base[:, :3]
+    if reference.period is not None:
+        phases = np.linspace(0.0, cycles * reference.period, 8 * min(cycles, 64) + 1)
+        path = np.concatenate([path, np.array([reference.base(p)[:3] for p in phases])])
+    margin = 2.0 * reach + 2.0 * size + 0.1
+    return path.min(axis=0) - margin, path.max(axis=0) + margin

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bodyplan.arrays import Array, number, whole
+from bodyplan.arrays import number, whole
 from bodyplan.errors import InputError, Status
 from bodyplan.motion import Motion
 from bodyplan.simulate.friction import FloorFriction, Friction, as_friction
@@ -16,7 +16,7 @@ from bodyplan.simulate.library import mujoco, warnings_kept
 from bodyplan.simulate.loop import Run, Timing
 from bodyplan.simulate.measure import cost_of_transport, planned_advance, progress_of, slips_of
 from bodyplan.simulate.model import Physics, Servo, build
-from bodyplan.simulate.reference import Reference
+from bodyplan.simulate.reference import Reference, region
 from bodyplan.simulate.start import Walls, on_the_floor
 from bodyplan.simulate.trial import Trial
 
@@ -60,6 +60,8 @@ def simulate(
     """
     if not isinstance(motion, Motion):
         raise InputError(f"motion: expected a Motion, got {motion!r}.")
+    if not motion.robot.contacts:
+        raise InputError(f"robot {motion.robot.name!r}: has no contacts; it could only fall.")
     cycles = whole(cycles, "cycles", at_least=1, at_most=100_000)
     reference = Reference.of(motion)
     cycles = cycles if reference.period is not None else 1
@@ -76,7 +78,7 @@ def simulate(
             f"dt: {timing.steps} time steps are more than the {MOST_STEPS} allowed; got dt = {dt!r}."
         )
     floor = as_friction(friction)
-    low, high = _region(motion, reference, cycles)
+    low, high = region(reference, cycles)
     physics = build(
         motion.robot,
         motion.ground,
@@ -94,7 +96,7 @@ def simulate(
         data = mujoco().MjData(physics.model)
         q = reference.joints(timing.first_phase)
         data.qpos[:] = physics.qpos(
-            q, on_the_floor(physics, q, reference.base(timing.first_phase), motion.ground)
+            q, on_the_floor(motion.robot, q, reference.base(timing.first_phase), motion.ground)
         )
         walls = Walls.around(physics, data)
         run = Run(physics, data, reference, timing, walls, report)
@@ -133,23 +135,6 @@ def simulate(
             "self_collision": self_collision,
         },
     )
-
-
-def _region(motion: Motion, reference: Reference, cycles: int) -> tuple[Array, Array]:
-    """A box (3,), (3,) that holds the planned robot in all cycles, and as much again around it as it is
-    long."""
-    positions = motion.poses().positions
-    reach = float(np.max(np.linalg.norm(positions - motion.base[:, None, :3], axis=-1), initial=0.0))
-    size = max(
-        (c.radius + max(map(abs, (*c.start, *c.end, *c.half))) for c in motion.robot.contacts), default=0.0
-    )
-    path = motion.base[:, :3]
-    if reference.period is not None:
-        # cycle by cycle the path turns about a fixed axis, so that its corners are among these
-        phases = np.linspace(0.0, cycles * reference.period, 64 * min(cycles, 64) + 1)
-        path = np.concatenate([path, np.array([reference.base(p)[:3] for p in phases])])
-    margin = 2.0 * reach + 2.0 * size + 0.1
-    return path.min(axis=0) - margin, path.max(axis=0) + margin
 
 
 def _remarks_on(motion: Motion) -> list[str]:

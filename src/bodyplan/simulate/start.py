@@ -15,7 +15,9 @@ import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError
+from bodyplan.ground.base import Ground
 from bodyplan.robot.elements import Contact
+from bodyplan.robot.model import Robot
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.model import Physics
 from bodyplan.spatial.rotations import rotate
@@ -24,14 +26,14 @@ from bodyplan.spatial.rotations import rotate
 CLOSING = 0.7
 
 
-def on_the_floor(physics: Physics, q: Array, base: Array, ground: Any) -> Array:
+def on_the_floor(robot: Robot, q: Array, base: Array, ground: Ground) -> Array:
     """``base`` (7,) moved along z so that the lowest contact shape touches the floor.
 
     A ball of radius r on a slope with gradient g needs its centre r sqrt(1 + |g|^2) above the floor.
     """
-    poses = physics.robot.forward(q, base)
+    poses = robot.forward(q, base)
     lift = []
-    for contact in physics.robot.contacts:
+    for contact in robot.contacts:
         points, radius = _skeleton(contact)
         pose = poses[contact.frame]
         at = pose[:3] + rotate(pose[3:], points)

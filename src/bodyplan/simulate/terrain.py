@@ -9,7 +9,7 @@ import numpy as np
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Solid
 from bodyplan.robot.model import Robot
-from bodyplan.simulate.friction import Friction, Scales, pair_friction
+from bodyplan.simulate.friction import DEFAULT, Friction, Scales, pair_friction
 from bodyplan.simulate.library import mujoco
 from bodyplan.spatial.rotations import rotate
 
@@ -19,6 +19,7 @@ FLOOR_RGBA, WALL_RGBA = (0.62, 0.66, 0.70, 1.0), (0.45, 0.55, 0.65, 0.35)
 
 
 def geom_name(solid: Solid) -> str:
+    """Name of a solid's shape in the model."""
     return f"ground:{solid.name}"
 
 
@@ -55,8 +56,7 @@ def add_solid(spec: Any, solid: Solid) -> None:
 
 
 def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: float | Friction | None) -> None:
-    if not robot.contacts:
-        raise InputError(f"robot {robot.name!r}: has no contacts; it could only fall.")
+    """Explicit pairs of every contact with every solid, named "contact on solid"."""
     for contact in robot.contacts:
         for solid in solids:
             along, across = pair_friction(solid, contact, friction)
@@ -77,6 +77,7 @@ def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: floa
 
 
 def add_self_pairs(spec: Any, robot: Robot) -> None:
+    """Pairs of the robot's contacts with each other, except on one frame or on frames next to each other."""
     near = {
         frozenset((c.frame_name(i), c.parent if i == 0 else c.frame_name(i - 1)))
         for c in robot.chains
@@ -85,7 +86,7 @@ def add_self_pairs(spec: Any, robot: Robot) -> None:
     for i, one in enumerate(robot.contacts):
         for other in robot.contacts[i + 1 :]:
             if one.frame != other.frame and frozenset((one.frame, other.frame)) not in near:
-                mu = max((f for f in (one.friction, other.friction) if f is not None), default=0.5)
+                mu = max((f for f in (one.friction, other.friction) if f is not None), default=DEFAULT)
                 spec.add_pair(
                     name=f"{one.name} on {other.name}",
                     geomname1=one.name,
@@ -96,6 +97,7 @@ def add_self_pairs(spec: Any, robot: Robot) -> None:
 
 
 def scales_of(model: Any, robot: Robot, solids: tuple[Solid, ...], friction: Friction) -> Scales:
+    """The scales of every contact on every floor of a compiled model."""
     floors = [solid for solid in solids if solid.role == "floor"]
     pairs = [
         (model.pair(f"{c.name} on {s.name}").id, model.geom(c.name).id, c, s)
