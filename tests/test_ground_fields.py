@@ -13,21 +13,25 @@ from bodyplan.expressions import Expression
 from bodyplan.ground import Ground, HeightMap, Plane, Surface, from_dict
 from bodyplan.ground.heightfiles import MAX_SAMPLES
 
-RNG = np.random.default_rng(11)
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Fresh for every test, so that no test depends on those before it."""
+    return np.random.default_rng(11)
 
 
-def rough_map(ny: int = 9, nx: int = 12) -> HeightMap:
-    return HeightMap(RNG.normal(size=(ny, nx)), (0.1, 0.13), (-0.5, 0.4))
+def rough_map(rng: np.random.Generator, ny: int = 9, nx: int = 12) -> HeightMap:
+    return HeightMap(rng.normal(size=(ny, nx)), (0.1, 0.13), (-0.5, 0.4))
 
 
-def inside(ground: HeightMap, n: int) -> np.ndarray:
+def inside(ground: HeightMap, n: int, rng: np.random.Generator) -> np.ndarray:
     (x0, x1), (y0, y1) = ground.extent
-    return RNG.uniform([x0, y0], [x1, y1], (n, 2))
+    return rng.uniform([x0, y0], [x1, y1], (n, 2))
 
 
-def test_the_waves_of_the_wheel_paper() -> None:
+def test_the_waves_of_the_wheel_paper(rng: np.random.Generator) -> None:
     ground = Surface("sin(0.5*(x+y))/15")
-    x, y = RNG.uniform(-9.0, 9.0, (2, 50))
+    x, y = rng.uniform(-9.0, 9.0, (2, 50))
     s = 0.5 * (x + y)
     slope, bend = np.cos(s) / 30.0, -np.sin(s) / 60.0
     np.testing.assert_allclose(ground.height(x, y), np.sin(s) / 15.0, atol=1e-16)
@@ -41,8 +45,8 @@ def test_the_waves_of_the_wheel_paper() -> None:
     np.testing.assert_allclose(ground.curvature(x, y), expected, atol=1e-15)
 
 
-def test_curvature_of_spheres_cylinders_and_paraboloids_off_the_apex() -> None:
-    x, y = RNG.uniform(-1.0, 1.0, (2, 40))
+def test_curvature_of_spheres_cylinders_and_paraboloids_off_the_apex(rng: np.random.Generator) -> None:
+    x, y = rng.uniform(-1.0, 1.0, (2, 40))
     np.testing.assert_allclose(Surface("sqrt(4 - x**2 - y**2)").curvature(x, y), -0.5, rtol=1e-13)
     np.testing.assert_allclose(Surface("-sqrt(4 - x**2 - y**2)").curvature(x, y), 0.5, rtol=1e-13)
     cylinder = Surface("sqrt(4 - (0.6*x + 0.8*y)**2) + 0*x").curvature(x, y)
@@ -54,9 +58,9 @@ def test_curvature_of_spheres_cylinders_and_paraboloids_off_the_apex() -> None:
     np.testing.assert_allclose(paraboloid, np.stack([meridian, parallel], axis=-1), rtol=1e-13)
 
 
-def test_curvature_has_the_mean_and_the_gauss_curvature_of_the_textbook() -> None:
+def test_curvature_has_the_mean_and_the_gauss_curvature_of_the_textbook(rng: np.random.Generator) -> None:
     ground = Surface("0.3*sin(2*x)*cos(3*y) + x*y - 0.2*x")
-    x, y = RNG.uniform(-1.0, 1.0, (2, 40))
+    x, y = rng.uniform(-1.0, 1.0, (2, 40))
     fx, fy = np.moveaxis(ground.gradient(x, y), -1, 0)
     h = ground.hessian(x, y)
     fxx, fxy, fyy = h[:, 0, 0], h[:, 0, 1], h[:, 1, 1]
@@ -100,8 +104,8 @@ def test_the_tip_of_a_cone_has_a_height_but_no_normal() -> None:
         cone.normal(0.0, 0.0)
 
 
-def test_spline_passes_through_the_samples() -> None:
-    z = RNG.normal(size=(5, 7)) + 1000.0
+def test_spline_passes_through_the_samples(rng: np.random.Generator) -> None:
+    z = rng.normal(size=(5, 7)) + 1000.0
     ground = HeightMap(z, (0.1, 0.2), (3.0, -1.0))
     x, y = 3.0 + 0.1 * np.arange(7), -1.0 + 0.2 * np.arange(5)
     np.testing.assert_allclose(ground.height(x[None, :], y[:, None]), z, rtol=1e-15)
@@ -115,25 +119,27 @@ def test_spline_passes_through_the_samples() -> None:
     ("ny", "nx", "degree_y", "degree_x"),
     [(6, 5, 3, 3), (4, 9, 3, 3), (3, 4, 2, 3), (2, 3, 1, 2), (2, 2, 1, 1)],
 )
-def test_spline_is_exact_on_polynomials(ny: int, nx: int, degree_y: int, degree_x: int) -> None:
-    c = RNG.normal(size=(degree_y + 1, degree_x + 1))
+def test_spline_is_exact_on_polynomials(
+    ny: int, nx: int, degree_y: int, degree_x: int, rng: np.random.Generator
+) -> None:
+    c = rng.normal(size=(degree_y + 1, degree_x + 1))
     text = " + ".join(
         f"({float(c[j, i])!r})*x**{i}*y**{j}" for j in range(degree_y + 1) for i in range(degree_x + 1)
     )
     exact = Surface(text)
     x, y = 0.2 + 0.3 * np.arange(nx), -0.7 + 0.25 * np.arange(ny)
     ground = HeightMap(exact.height(x[None, :], y[:, None]), (0.3, 0.25), (0.2, -0.7))
-    p = inside(ground, 60)
+    p = inside(ground, 60, rng)
     np.testing.assert_allclose(ground.height(p), exact.height(p), atol=1e-13)
     np.testing.assert_allclose(ground.gradient(p), exact.gradient(p), atol=1e-12)
     np.testing.assert_allclose(ground.hessian(p), exact.hessian(p), atol=1e-10)
 
 
-def test_spline_is_that_of_fitpack() -> None:
-    ground = rough_map()
+def test_spline_is_that_of_fitpack(rng: np.random.Generator) -> None:
+    ground = rough_map(rng)
     x, y = -0.5 + 0.1 * np.arange(12), 0.4 + 0.13 * np.arange(9)
     other = RectBivariateSpline(y, x, ground.z, kx=3, ky=3, s=0)
-    p = inside(ground, 200)
+    p = inside(ground, 200, rng)
     f, g, h = ground.height(p), ground.gradient(p), ground.hessian(p)
     orders = {
         (0, 0): f,
@@ -149,8 +155,8 @@ def test_spline_is_that_of_fitpack() -> None:
     np.testing.assert_array_equal(h[:, 0, 1], h[:, 1, 0])
 
 
-def test_spline_is_twice_continuously_differentiable_across_cells() -> None:
-    ground = rough_map()
+def test_spline_is_twice_continuously_differentiable_across_cells(rng: np.random.Generator) -> None:
+    ground = rough_map(rng)
     for k in range(1, 11):
         y = np.linspace(0.41, 1.43, 23)
         left, right = (ground.hessian(-0.5 + 0.1 * k + side * 1e-11, y) for side in (-1.0, 1.0))
@@ -159,9 +165,9 @@ def test_spline_is_twice_continuously_differentiable_across_cells() -> None:
         np.testing.assert_allclose(left, right, atol=1e-7)
 
 
-def test_derivatives_of_the_map_are_those_of_its_height() -> None:
-    ground, h = rough_map(), 1e-5
-    p = 0.999 * (inside(ground, 100) - [0.05, 0.92]) + [0.05, 0.92]
+def test_derivatives_of_the_map_are_those_of_its_height(rng: np.random.Generator) -> None:
+    ground, h = rough_map(rng), 1e-5
+    p = 0.999 * (inside(ground, 100, rng) - [0.05, 0.92]) + [0.05, 0.92]
     for axis in range(2):
         step = h * np.eye(2)[axis]
         slope = (ground.height(p + step) - ground.height(p - step)) / (2 * h)
@@ -170,16 +176,16 @@ def test_derivatives_of_the_map_are_those_of_its_height() -> None:
         np.testing.assert_allclose(ground.hessian(p)[:, axis], bend, atol=2e-3)
 
 
-def test_the_map_does_not_depend_on_origin_or_level() -> None:
-    z = RNG.normal(size=(7, 8)) * 0.01
+def test_the_map_does_not_depend_on_origin_or_level(rng: np.random.Generator) -> None:
+    z = rng.normal(size=(7, 8)) * 0.01
     near, far = HeightMap(z, 0.01), HeightMap(z + 4000.0, 0.01, (64.0, -32.0))
-    p, shift = inside(near, 50), np.array([64.0, -32.0])
+    p, shift = inside(near, 50, rng), np.array([64.0, -32.0])
     np.testing.assert_allclose(far.height(p + shift) - 4000.0, near.height(p), atol=1e-11)
     np.testing.assert_allclose(far.hessian(p + shift), near.hessian(p), rtol=1e-7, atol=1e-6)
 
 
-def test_map_edges_and_refusals() -> None:
-    ground = rough_map()
+def test_map_edges_and_refusals(rng: np.random.Generator) -> None:
+    ground = rough_map(rng)
     (x0, x1), (y0, y1) = ground.extent
     assert ground.height([x0, x1, x1], [y0, y1, y0]).shape == (3,)
     with pytest.raises(
@@ -211,12 +217,12 @@ def test_map_edges_and_refusals() -> None:
             HeightMap(**{"z": zeros, "cell": 0.1, **arguments})  # type: ignore[arg-type]
 
 
-def test_scale_multiplies_heights_only() -> None:
-    z = RNG.normal(size=(5, 5))
+def test_scale_multiplies_heights_only(rng: np.random.Generator) -> None:
+    z = rng.normal(size=(5, 5))
     a, b = HeightMap(z, 0.5, scale=3.0), HeightMap(3.0 * z, 0.5)
     assert a == b
     assert from_dict(json.loads(json.dumps(a.to_dict()))) == b
-    large = HeightMap(RNG.normal(size=(80, 70)), 0.1)
+    large = HeightMap(rng.normal(size=(80, 70)), 0.1)
     assert isinstance(large.to_dict()["z"], dict)
     for bad in (
         {"float64": "AAAA", "shape": [80, 70]},

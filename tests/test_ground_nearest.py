@@ -10,7 +10,11 @@ from hypothesis import strategies as st
 from bodyplan.ground import HeightMap, Surface
 from bodyplan.ground.field import Field
 
-RNG = np.random.default_rng(17)
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Fresh for every test, so that no test depends on those before it."""
+    return np.random.default_rng(17)
 
 
 def brute_force(ground: Field, points: np.ndarray, first: int = 601) -> np.ndarray:
@@ -42,9 +46,9 @@ def brute_force(ground: Field, points: np.ndarray, first: int = 601) -> np.ndarr
         "exp(-8*(x**2 + y**2))",
     ],
 )
-def test_nothing_in_reach_is_nearer(text: str) -> None:
+def test_nothing_in_reach_is_nearer(text: str, rng: np.random.Generator) -> None:
     ground = Surface(text)
-    p = RNG.uniform([-1.0, -1.0, -0.6], [1.0, 1.0, 1.0], (8, 3))
+    p = rng.uniform([-1.0, -1.0, -0.6], [1.0, 1.0, 1.0], (8, 3))
     clearance, brute = ground.clearance(p), brute_force(ground, p)
     np.testing.assert_array_equal(np.sign(clearance), np.sign(p[:, 2] - ground.height(p)))
     assert np.all(np.abs(clearance) <= brute + 1e-12)
@@ -53,24 +57,24 @@ def test_nothing_in_reach_is_nearer(text: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["-abs(x) + 0.3*max(y, x - 1) + 0.1*x*y", "min(abs(x - 0.3), abs(y), 0.2)", "0.3*max(sin(5*x), 0.2*y)"],
+    ["-abs(x) + 0.3*max(y, x - 1) + 0.1*x*y", "min(abs(x - 0.3), abs(y), 0.2)"],
 )
-def test_nothing_in_reach_is_nearer_on_creased_ground(text: str) -> None:
+def test_nothing_in_reach_is_nearer_on_creased_ground(text: str, rng: np.random.Generator) -> None:
     ground = Surface(text)
-    p = RNG.uniform([-1.0, -1.0, -0.6], [1.0, 1.0, 1.0], (8, 3))
+    p = rng.uniform([-1.0, -1.0, -0.6], [1.0, 1.0, 1.0], (8, 3))
     clearance, brute = np.abs(ground.clearance(p)), brute_force(ground, p)
     assert np.all(clearance <= brute + 1e-12)
     # the refined grid loses its way along a crease that runs askew: it knows the distance there to 1e-6 only
     assert np.all(clearance >= brute - 1e-6)
 
 
-def test_nearest_points_on_a_curved_crease() -> None:
+def test_nearest_points_on_a_curved_crease(rng: np.random.Generator) -> None:
     ground = Surface("0.3*max(sin(5*x), 0.2*y)")
-    p = RNG.uniform([-0.5, -2.0, -0.6], [0.5, 2.0, -0.35], (20, 3))
+    p = rng.uniform([-0.5, -2.0, -0.6], [0.5, 2.0, -0.35], (40, 3))
     foot = ground.nearest(p)
     on_crease = np.abs(np.sin(5.0 * foot[:, 0]) - 0.2 * foot[:, 1]) < 1e-9
-    assert np.count_nonzero(on_crease) > 5
-    centre, r = np.zeros((20, 1)), 1.0
+    assert np.count_nonzero(on_crease) >= 5
+    centre, r = np.zeros((40, 1)), 1.0
     for _ in range(5):  # the crease is the curve y = 5 sin(5x): a search along one line
         x = centre + np.linspace(-r, r, 20_001)
         d = np.sqrt(
@@ -83,23 +87,24 @@ def test_nearest_points_on_a_curved_crease() -> None:
     clearance = np.abs(ground.clearance(p))
     assert np.all(clearance <= along * (1.0 + 1e-11))
     np.testing.assert_allclose(clearance[on_crease], along[on_crease], rtol=1e-11)
+    np.testing.assert_allclose(clearance, np.minimum(along, brute_force(ground, p, 301)), atol=1e-9)
 
 
-def test_nothing_in_reach_is_nearer_on_rough_maps() -> None:
-    rough = HeightMap(RNG.normal(size=(9, 12)) * 0.1, (0.1, 0.13), (-0.5, -0.5))
+def test_nothing_in_reach_is_nearer_on_rough_maps(rng: np.random.Generator) -> None:
+    rough = HeightMap(rng.normal(size=(9, 12)) * 0.1, (0.1, 0.13), (-0.5, -0.5))
     (x0, x1), (y0, y1) = rough.extent
-    p = RNG.uniform([x0, y0, -0.5], [x1, y1, 0.5], (25, 3))
+    p = rng.uniform([x0, y0, -0.5], [x1, y1, 0.5], (25, 3))
     brute = brute_force(rough, p, 301)
     np.testing.assert_allclose(np.abs(rough.clearance(p)), brute, atol=1e-8)
     assert np.all(np.abs(rough.clearance(p)) <= brute + 1e-12)
     terrain = HeightMap.jacksboro()
-    p = RNG.uniform([-1.0, -1.0, 0.0], [1.0, 1.0, 0.3], (8, 3))
+    p = rng.uniform([-1.0, -1.0, 0.0], [1.0, 1.0, 0.3], (8, 3))
     np.testing.assert_allclose(np.abs(terrain.clearance(p)), brute_force(terrain, p, 401), atol=1e-8)
 
 
-def test_the_nearest_point_lies_on_the_ground_along_the_normal() -> None:
+def test_the_nearest_point_lies_on_the_ground_along_the_normal(rng: np.random.Generator) -> None:
     ground = Surface("0.3*sin(4*x)*cos(3*y)")
-    p = RNG.uniform([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0], (3, 20, 3))
+    p = rng.uniform([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0], (3, 20, 3))
     foot = ground.nearest(p)
     assert foot.shape == p.shape
     np.testing.assert_allclose(foot[..., 2], ground.height(foot), atol=1e-15)
@@ -107,13 +112,13 @@ def test_the_nearest_point_lies_on_the_ground_along_the_normal() -> None:
     np.testing.assert_allclose(p - foot, ground.clearance(p)[..., None] * ground.normal(foot), atol=1e-8)
 
 
-def test_spheres() -> None:
+def test_spheres(rng: np.random.Generator) -> None:
     hill = Surface("sqrt(1 - x**2 - y**2)")
-    direction = RNG.normal(size=(40, 3))
+    direction = rng.normal(size=(40, 3))
     direction[:, 2] = np.abs(direction[:, 2]) + 0.5
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     # inside, the ray of the direction stays above the rim of the cap only for points high enough
-    radius = RNG.uniform(0.5, 1.0 / np.abs(direction[:, :2]).sum(axis=1).max(), 40)
+    radius = rng.uniform(0.5, 1.0 / np.abs(direction[:, :2]).sum(axis=1).max(), 40)
     p = radius[:, None] * direction
     p = p[np.hypot(p[:, 0], p[:, 1]) < 0.99]
     np.testing.assert_allclose(hill.clearance(p), np.linalg.norm(p, axis=1) - 1.0, atol=1e-12)
@@ -137,9 +142,9 @@ def test_paraboloid_on_its_axis() -> None:
     np.testing.assert_allclose(bowl.clearance(-p), -z, rtol=1e-12)
 
 
-def test_tilted_plane_and_points_on_the_ground() -> None:
+def test_tilted_plane_and_points_on_the_ground(rng: np.random.Generator) -> None:
     ground = Surface("0.75*x - y + 0.1")
-    p = RNG.normal(size=(50, 3))
+    p = rng.normal(size=(50, 3))
     expected = (p[:, 2] - ground.height(p)) / np.sqrt(1.0 + 0.75**2 + 1.0)
     np.testing.assert_allclose(ground.clearance(p), expected, atol=1e-14)
     waves = Surface("0.2*sin(7*x)*cos(y)")

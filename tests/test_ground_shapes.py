@@ -17,18 +17,24 @@ STAIRS = Profile(
     floor=[(-np.inf, 0.0), (1.0, 0.5), (2.0, 0.2)],
     ceiling=[(None, None), (0.5, 1.4), (2.5, 0.9), (3.0, np.inf)],
 )
-RNG = np.random.default_rng(3)
+_SEEDED = np.random.default_rng(3)
 GROUNDS = [
     Plane(),
     Plane(0.3, slope=(0.2, -0.4), friction=0.7),
     Surface("sin(0.5*(x+y))/15", friction=0.5),
     Surface("x*y", bounds=((-2.0, 2.0), (-3.0, 3.0))),
-    HeightMap(RNG.normal(size=(6, 8)), (0.9, 1.1), (-3.0, -2.7), friction=0.2),
-    HeightMap(RNG.normal(size=(70, 80)), 0.1, (-3.95, -3.45)),
+    HeightMap(_SEEDED.normal(size=(6, 8)), (0.9, 1.1), (-3.0, -2.7), friction=0.2),
+    HeightMap(_SEEDED.normal(size=(70, 80)), 0.1, (-3.95, -3.45)),
     Corridor(0.108, height=0.05, floor=-0.01, friction=0.05, wall_friction=1.0),
     STAIRS,
     Profile(-0.1, friction=0.4),
 ]
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Fresh for every test, so that no test depends on those before it."""
+    return np.random.default_rng(3)
 
 
 def rotated_z(q: Sequence[float]) -> np.ndarray:
@@ -184,18 +190,18 @@ def test_profile_distances() -> None:
 @pytest.mark.parametrize(
     "ground", [Corridor(0.4, height=0.1, floor=1.0), STAIRS, Profile(0.0, 0.8), Plane(1.0)]
 )
-def test_clearance_is_the_distance_to_the_solids(ground: Ground) -> None:
+def test_clearance_is_the_distance_to_the_solids(ground: Ground, rng: np.random.Generator) -> None:
     low, high = np.array([-3.0, -2.0, -1.0]), np.array([6.0, 2.0, 3.0])
     solids = ground.solids(low, high)
     assert len({s.name for s in solids}) == len(solids)
-    p = RNG.uniform([-1.0, -0.8, -0.2], [4.0, 0.8, 1.8], (4000, 3))
+    p = rng.uniform([-1.0, -0.8, -0.2], [4.0, 0.8, 1.8], (4000, 3))
     distance = np.min([distance_to_solid(s, p) for s in solids], axis=0)
     clearance = ground.clearance(p)
     assert np.count_nonzero(clearance > 0.0) > 1000
     np.testing.assert_allclose(clearance[clearance > 0.0], distance[clearance > 0.0], atol=1e-14)
     assert np.all(distance[clearance <= 0.0] <= 0.0)
     # inside, along the way to free space the clearance changes at most as fast as the point moves
-    q = p + RNG.normal(size=p.shape) * 0.05
+    q = p + rng.normal(size=p.shape) * 0.05
     assert np.all(np.abs(ground.clearance(q) - clearance) <= np.linalg.norm(q - p, axis=1) + 1e-15)
 
 
