@@ -17,6 +17,7 @@ from bodyplan.robot.elements import Body, Contact, Joint, Row
 from bodyplan.robot.library import snake
 from bodyplan.robot.model import Robot
 from bodyplan.simulate import Friction, Trial, simulate
+from bodyplan.simulate.loop import Timing
 from bodyplan.simulate.measure import Records, progress_of, slips_of
 from bodyplan.simulate.reference import Reference, region
 from bodyplan.spatial.rotations import multiply, quaternion_exp
@@ -303,10 +304,21 @@ def test_progress_and_slip_of_records_that_are_known() -> None:
     np.testing.assert_allclose(found["advance_ratio"], [0.8, 0.2], atol=1e-12)
     np.testing.assert_allclose(found["sideways"], [0.01, -0.04], atol=1e-15)
     assert found["speed"] == pytest.approx(0.025)
-    slips = slips_of(motion, records, planned, 1.0, 1.0)
+    slips = slips_of(motion, records, planned, lambda phase: 1.0 + phase, 1.0)
     assert [(s.cycle, s.start, s.end) for s in slips] == [(0, 1.25, 1.75), (1, 2.25, 2.75)]
     assert slips[0].along == pytest.approx(-0.001) and slips[0].largest == pytest.approx(0.001)
     assert slips[1].along == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_phase_and_time_are_inverse_to_each_other(periodic: bool) -> None:
+    reference = Reference.of(wriggle(cycles=1.2 if periodic else 0.9))
+    timing = Timing.of(reference, 2, dt=1e-3, settle=0.3, ramp=0.4, record_dt=0.02)
+    assert timing.periodic is periodic
+    for phase in (0.0, 0.1, 0.2, 0.55, 0.9):
+        assert timing.phase(np.array(timing.time_of(phase))) == pytest.approx(phase, abs=1e-12)
+    assert timing.time_of(0.0) == pytest.approx(timing.start_time)
+    assert timing.time_of(reference.duration) == pytest.approx(timing.start_time + timing.span)
 
 
 def test_misuse_is_refused_where_it_is_said() -> None:

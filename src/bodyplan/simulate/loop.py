@@ -43,10 +43,10 @@ class Timing:
     ) -> Timing:
         """The timing of ``cycles`` runs through the reference."""
         periodic = reference.period is not None
-        span = reference.duration if periodic else reference.duration + 0.5 * ramp
         # whole time steps, so that the phases do not depend on rounding
-        whole = [max(0, round(x / dt)) * dt for x in (settle, ramp)]
-        return cls(dt, whole[0], whole[1], span, cycles, max(1, round(record_dt / dt)), periodic)
+        settle, ramp = (round(x / dt) * dt for x in (settle, ramp))
+        span = reference.duration if periodic else reference.duration + 0.5 * ramp
+        return cls(dt, settle, ramp, span, cycles, max(1, round(record_dt / dt)), periodic)
 
     @property
     def start_time(self) -> float:
@@ -69,6 +69,13 @@ class Timing:
         s = np.maximum(t - self.settle, 0.0)
         ramp = max(self.ramp, 1e-300)
         return np.asarray(self.first_phase + np.where(s < self.ramp, 0.5 * s * s / ramp, s - 0.5 * self.ramp))
+
+    def time_of(self, phase: float) -> float:
+        """s at which the motion reaches a phase >= 0."""
+        late = phase - self.first_phase
+        if late < 0.5 * self.ramp:
+            return self.settle + float(np.sqrt(2.0 * self.ramp * late))
+        return self.settle + late + 0.5 * self.ramp
 
 
 class Run:
@@ -142,7 +149,9 @@ class Run:
 
     def warnings(self) -> list[str]:
         """What to know of the run."""
-        robot, found, s = self.physics.robot, [], self._count
+        robot, found, s = self.physics.robot, list[str](), self._count
+        if s == 0:
+            return found
         q, force = self.physics.q(self._qpos[:s]), self._force[:s]
         for i, column in enumerate(self.physics.servos):
             name, effort = robot.joints[column], robot.efforts[column]

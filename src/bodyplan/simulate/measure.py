@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,28 +108,29 @@ def directions(planned: Array) -> Array:
 
 
 def slips_of(
-    motion: Motion, records: Records, planned: Array, start: float, period: float
+    motion: Motion, records: Records, planned: Array, time_of: Callable[[float], float], period: float
 ) -> tuple[Slip, ...]:
-    """What the ``at_rest`` claims of the motion became, cycle by cycle; intervals that end after the
-    measured part are left out."""
+    """What the ``at_rest`` claims of the motion became, cycle by cycle. ``time_of``: s of the trial at
+    which the motion reaches a phase (s since its first sample). Intervals that end after the records are
+    left out."""
     claims = [claim for claim in motion.claims if claim.kind == "at_rest"]
     if not claims:
         return ()
     positions = motion.robot.forward(records.q, records.base).positions
-    ahead, end = directions(planned), start + len(planned) * period
+    ahead, last = directions(planned), float(records.t[-1]) + 1e-9 * period
     out = []
     for claim in claims:
         frames = [motion.robot.frame_index(name) for name in claim.data["frames"]]
         tracks = positions[:, frames]
+        stage = str(claim.data.get("stage", claim.label))
+        begin, stop = (time_of(float(claim.data[key]) - float(motion.t[0])) for key in ("start", "end"))
         for cycle in range(len(planned)):
-            shift = start - motion.t[0] + cycle * period
-            t0, t1 = float(claim.data["start"]) + shift, float(claim.data["end"]) + shift
-            if t1 > end + 1e-9 * period or t1 <= t0:
+            t0, t1 = begin + cycle * period, stop + cycle * period
+            if t1 > last or t1 <= t0:
                 continue
             between = records.t[(records.t > t0) & (records.t < t1)]
             moved = at(records.t, tracks, np.concatenate([[t0], between, [t1]]))
             moved -= moved[0].copy()
-            stage = str(claim.data.get("stage", claim.label))
             along = float(np.mean(moved[-1] @ ahead[cycle]))
             largest = float(np.max(np.linalg.norm(moved, axis=-1)))
             out.append(Slip(stage, claim.label, cycle, t0, t1, along, largest))

@@ -109,7 +109,7 @@ def simulate(
         positive, absolute = (float(w.sum()) * dt for w in (run.meter.positive, run.meter.absolute))
         weight = float(physics.model.body_mass.sum()) * float(np.linalg.norm(physics.model.opt.gravity))
         measures |= {
-            "slips": slips_of(motion, records, planned, start, period),
+            "slips": slips_of(motion, records, planned, timing.time_of, period),
             "positive_work": positive,
             "absolute_work": absolute,
             "cost_of_transport": cost_of_transport(positive, weight, measures["speed"] * cycles * period),
