@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from bodyplan.motion import Claim, Motion, times
     from bodyplan.plan import plan
     from bodyplan.robot import Arc, Body, Chain, Contact, Joint, Robot, Row, WheelRadius, snake
+    from bodyplan.show import show
     from bodyplan.simulate import Friction, Trial, simulate
 
 __version__ = "0.1.0"
@@ -77,6 +78,7 @@ _FACE = {
     "Friction": "simulate",
     "Trial": "simulate",
     "simulate": "simulate",
+    "show": "show",
     "load": "export",
     "save": "export",
     "load_mission": "missions",

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import platform
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from bodyplan import __version__
-from bodyplan.show.outcome import Outcome, five_point_rates
+from bodyplan.show.outcome import Outcome, five_point_gaps
 
 STRICT = ConfigDict(extra="forbid")
 
@@ -82,27 +80,17 @@ def metrics_of(outcome: Outcome) -> Metrics:
     """The metrics of a run."""
     motion, trial = outcome.motion, outcome.trial
     statuses, counts = np.unique(motion.status, return_counts=True)
-    rate, acceleration = five_point_rates(motion)
-    gaps = {
-        "rate_gap_rms": float(np.sqrt(np.mean((rate - motion.qd) ** 2))),
-        "rate_gap_max": float(np.abs(rate - motion.qd).max(initial=0.0)),
-        "acceleration_gap_rms": float(np.sqrt(np.mean((acceleration - motion.qdd) ** 2))),
-        "acceleration_gap_max": float(np.abs(acceleration - motion.qdd).max(initial=0.0)),
-    }
-    versions = {"bodyplan": __version__, "python": platform.python_version(), "numpy": np.__version__}
-    if trial is not None:
-        versions["mujoco"] = str(trial.settings["mujoco"])
     return Metrics(
         mission=outcome.name,
         title=outcome.title,
         overrides=list(outcome.overrides),
         verdict="ok" if outcome.ok else "failed",
-        versions=versions,
+        versions=outcome.versions,
         samples=len(motion.t),
         duration_s=float(motion.t[-1] - motion.t[0]),
         statuses={str(s): int(n) for s, n in zip(statuses, counts, strict=True)},
         plan=dict(motion.facts),
-        five_point=gaps,
+        five_point=five_point_gaps(motion),
         checks=[Check(**line.to_dict()) for line in outcome.report],
         trial=None if trial is None else trial.metrics(),
         settings=None if trial is None else dict(trial.settings),

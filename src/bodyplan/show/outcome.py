@@ -1,12 +1,15 @@
-"""What a report shows: a motion with its checks, its trial, other missions' figures, and variants of the gait."""
+"""What a report shows: a motion with its checks, its trial, other missions' figures, and variants of the
+gait."""
 
 from __future__ import annotations
 
+import platform
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bodyplan import __version__
 from bodyplan.check import Report
 from bodyplan.motion import Motion
 from bodyplan.rates import five_point
@@ -17,7 +20,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Figures of another mission, run the same way: advance executed / planned, speeds in m/s, torque in N m."""
+    """Figures of another mission, run the same way: advance executed / planned, speeds in m/s, torque in N
+    m."""
 
     name: str
     title: str
@@ -37,8 +41,17 @@ class Comparison:
         if trial is None:
             return cls(name, title, None, None, planned, rate, None, None, "not simulated")
         metrics: dict[str, Any] = dict(trial.metrics())
-        return cls(name, title, metrics["advance_ratio"], metrics["speed_m_s"], metrics["planned_speed_m_s"], rate,
-                   metrics.get("peak_torque_Nm"), metrics["cost_of_transport"], trial.status)
+        return cls(
+            name,
+            title,
+            metrics["advance_ratio"],
+            metrics["speed_m_s"],
+            metrics["planned_speed_m_s"],
+            rate,
+            metrics.get("peak_torque_Nm"),
+            metrics["cost_of_transport"],
+            trial.status,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """JSON types."""
@@ -47,8 +60,9 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Variant:
-    """Peak joint rate (rad/s) and acceleration (rad/s^2) of a variant of the gait: exact within smooth pieces, and by
-    the paper's five-point formula at the motion's sampling, which also sees the jumps of the rates."""
+    """Peak joint rate (rad/s) and acceleration (rad/s^2) of a variant of the gait: exact within smooth
+    pieces, and by the paper's five-point formula at the motion's sampling, which also sees the jumps of the
+    rates."""
 
     label: str
     peak_rate: float
@@ -60,7 +74,9 @@ class Variant:
     def of(cls, label: str, motion: Motion) -> Variant:
         """Measured on a motion with even samples."""
         rate, acceleration = five_point_rates(motion)
-        return cls(label, *(float(np.abs(a).max(initial=0.0)) for a in (motion.qd, motion.qdd, rate, acceleration)))
+        return cls(
+            label, *(float(np.abs(a).max(initial=0.0)) for a in (motion.qd, motion.qdd, rate, acceleration))
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """JSON types."""
@@ -68,10 +84,26 @@ class Variant:
 
 
 def five_point_rates(motion: Motion) -> tuple[Any, Any]:
-    """Joint rates and accelerations (T, n) as the paper takes them: the five-point formula, once and twice."""
+    """Joint rates and accelerations (T, n) as the paper takes them: the five-point formula, once and
+    twice."""
     h = float(np.diff(motion.t).mean())
     rate = five_point(motion.q, h)
     return rate, five_point(rate, h)
+
+
+def five_point_gaps(motion: Motion) -> dict[str, float]:
+    """How far the five-point formula is from the exact rates (rad/s) and accelerations (rad/s^2), rms and
+    largest; empty where the samples are fewer than five or uneven, or there are no joints."""
+    step = np.diff(motion.t)
+    if len(motion.t) < 5 or motion.q.size == 0 or np.ptp(step) > 1e-6 * step.mean():
+        return {}
+    out = {}
+    for name, taken, exact in zip(
+        ("rate", "acceleration"), five_point_rates(motion), (motion.qd, motion.qdd), strict=True
+    ):
+        out[f"{name}_gap_rms"] = float(np.sqrt(np.mean((taken - exact) ** 2)))
+        out[f"{name}_gap_max"] = float(np.abs(taken - exact).max())
+    return out
 
 
 @dataclass(frozen=True)
@@ -98,3 +130,11 @@ class Outcome:
     def itself(self) -> Comparison:
         """This run's own row beside the others."""
         return Comparison.of(self.name, self.title, self.motion, self.trial)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of what made the numbers."""
+        versions = {"bodyplan": __version__, "python": platform.python_version(), "numpy": np.__version__}
+        if self.trial is not None and "mujoco" in self.trial.settings:
+            versions["mujoco"] = str(self.trial.settings["mujoco"])
+        return versions

@@ -1,0 +1,188 @@
+"""The report of a run: one HTML file that opens anywhere, and its figures."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bodyplan.errors import InputError, MissingExtraError
+from bodyplan.export.files import replacing
+from bodyplan.show import sections
+from bodyplan.show.execution import execution
+from bodyplan.show.figures import write_figures
+from bodyplan.show.outcome import Outcome
+from bodyplan.show.overview import head
+from bodyplan.show.playback import Playback
+from bodyplan.show.plots import plots
+from bodyplan.show.scene import scene, script_json
+from bodyplan.show.text import esc, plot, section
+
+#: the page's own scripts, in the order in which they run
+SCRIPTS = ("pointer", "timeline", "replay", "plots")
+VIEWS = {"3d": "3D", "top": "Top", "side": "Side", "front": "Front"}
+SPEEDS = (0.1, 0.25, 0.5, 1, 2, 4, 8)
+
+
+def write_report(outcome: Outcome, folder: Path) -> Path:
+    """Write ``folder/report.html``, which needs nothing but a browser, and ``folder/figures/*.png`` and
+    ``*.svg``.
+
+    Returns the path of the HTML file. Raises InputError for a folder that does not exist, MissingExtraError
+    where matplotlib or plotly are not installed.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder to write the report to.")
+    playback = Playback.of(outcome.motion, outcome.trial)
+    drawn = write_figures(outcome, playback, folder / "figures")
+    return _write(outcome, playback, drawn, folder / "report.html")
+
+
+def write_page(outcome: Outcome, path: Path) -> Path:
+    """Write the HTML file alone, to ``path``. Raises as :func:`write_report`."""
+    playback = Playback.of(outcome.motion, outcome.trial)
+    with TemporaryDirectory() as scratch:
+        drawn = write_figures(outcome, playback, Path(scratch))
+    return _write(outcome, playback, drawn, path)
+
+
+def _write(outcome: Outcome, playback: Playback, drawn: Mapping[str, str], path: Path) -> Path:
+    with replacing(path) as file:
+        file.write(page(outcome, playback, drawn))  # type: ignore[call-overload]
+    return path
+
+
+def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
+    """The whole HTML file; ``drawn`` are the figures as SVG by name."""
+    scripts = [WATCH, _plotly(), *(_resource(f"{name}.js") for name in SCRIPTS)]
+    parts = {
+        "Replay": _replay(playback),
+        "Checks": sections.checks(outcome),
+        "Planned and executed": execution(outcome, playback),
+        "Comparison": sections.comparison(outcome),
+        "Plots": _curves(outcome, drawn),
+        "Rates": sections.rates(outcome),
+        "Notes and data": sections.notes(outcome),
+    }
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{esc(outcome.title)} – bodyplan</title>",
+            f"<style>{_resource('report.css')}</style>",
+            f"<script>{scripts[0]}</script></head>",
+            "<body><main>",
+            head(outcome, playback),
+            _contents(parts),
+            *parts.values(),
+            "</main>",
+            _data("replay-data", script_json(scene(playback))),
+            _data("plots-data", script_json(plots(outcome, playback))),
+            *(f"<script>{script}</script>" for script in scripts[1:]),
+            "</body></html>\n",
+        ]
+    )
+
+
+#: keeps what goes wrong in the page as an attribute of it, where a test or a curious person finds it
+WATCH = (
+    'const note=t=>{const d=document.documentElement.dataset;d.problems=(d.problems?d.problems+" | ":"")+t};'
+    'addEventListener("error",e=>note(e.message||"not loaded"),true);'
+    'addEventListener("unhandledrejection",e=>note(e.reason));'
+    'addEventListener("securitypolicyviolation",e=>note("blocked: "+e.violatedDirective+" "+e.blockedURI));'
+)
+
+
+def _policy(scripts: list[str]) -> str:
+    """Nothing is loaded from anywhere, and no script runs but the report's own, whatever texts a mission
+    holds."""
+    hashes = [base64.b64encode(hashlib.sha256(s.encode("utf-8")).digest()).decode("ascii") for s in scripts]
+    allowed = " ".join(f"'sha256-{h}'" for h in hashes)
+    rules = {
+        "default-src": "'none'",
+        "script-src": allowed,
+        "style-src": "'unsafe-inline'",
+        "img-src": "data: blob:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    return "; ".join(f"{name} {value}" for name, value in rules.items())
+
+
+def _plotly() -> str:
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise MissingExtraError("plotly", "report", "writing a report") from error
+    return str(get_plotlyjs())
+
+
+def _resource(name: str) -> str:
+    return resources.files("bodyplan.show").joinpath(name).read_text(encoding="utf-8")
+
+
+def _data(name: str, text: str) -> str:
+    return f'<script type="application/json" id="{name}">{text}</script>'
+
+
+def _contents(parts: Mapping[str, str]) -> str:
+    """Links to the parts that there are."""
+    places = {title: part.split('"')[1] for title, part in parts.items() if part}
+    links = "".join(f'<a href="#{place}">{title}</a>' for title, place in places.items())
+    return f'<nav aria-label="Contents">{links}</nav>'
+
+
+def _replay(playback: Playback) -> str:
+    executed = playback.executed is not None
+    toggles = [("planned", "planned", "planned")]
+    if executed:
+        toggles.append(("executed", "executed", "executed"))
+    toggles += [("trail", "trail", ""), ("follow", "follow", "")]
+    boxes = "".join(
+        f'<label class="{kind}"><input type="checkbox" data-toggle="{name}"> {text}</label>'
+        for name, text, kind in toggles
+    )
+    views = "".join(f'<button type="button" data-view="{v}">{t}</button>' for v, t in VIEWS.items())
+    speeds = "".join(f'<option value="{s}"{" selected" if s == 1 else ""}>{s}×</option>' for s in SPEEDS)
+    what = "planned (orange) and executed (blue)" if executed else "planned"
+    return section(
+        "motion",
+        "The motion",
+        f"""<div id="replay">
+<canvas data-part="canvas" tabindex="0" role="img" aria-label="Replay of the {what} motion"></canvas>
+<div class="controls"><button type="button" data-part="play" class="play">▶ Play</button>
+<input type="range" data-part="scrub" aria-label="Time" value="0">
+<label>speed <select data-part="speed">{speeds}</select></label></div>
+<canvas data-part="timeline" aria-hidden="true"></canvas>
+<p class="readout" data-part="readout"></p>
+<div class="controls"><span class="group">{views}</span><span class="group">
+<button type="button" data-zoom="1.25" aria-label="Zoom in">+</button>
+<button type="button" data-zoom="0.8" aria-label="Zoom out">−</button></span>{boxes}</div>
+<p class="hint">Drag to turn, shift-drag or two fingers to move, pinch or click and wheel to zoom; space
+plays, arrow keys step. Add <code>#t=3.2</code> to the address to open the report at a time.</p></div>""",
+    )
+
+
+def _curves(outcome: Outcome, drawn: Mapping[str, str]) -> str:
+    out = ""
+    if "body_keyframes" in drawn:
+        picture = base64.b64encode(drawn["body_keyframes"].encode("utf-8")).decode("ascii")
+        what = (
+            "planned and executed body" if outcome.trial is not None and outcome.trial.ok else "planned body"
+        )
+        out += (
+            '<h3>The body at key frames</h3><div class="scroll picture" tabindex="0"><img alt="The '
+            f'{what} at even times of one cycle" src="data:image/svg+xml;base64,{picture}"></div>'
+        )
+    for kind in ("angle", "length"):
+        if kind in outcome.motion.robot.kinds:
+            name = "angles" if kind == "angle" else "lengths"
+            out += f"<h3>Joint {name} over one cycle, planned</h3>" + plot(f"angles_{kind}")
+            out += plot(f"rates_{kind}") + plot(f"fastest_{kind}")
+    return section("curves", "Plots", out)

@@ -1,0 +1,105 @@
+"""What the replay in the browser needs, as JSON: shapes, poses by frame and time, ground, stages."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.robot.model import Robot
+from bodyplan.show.playback import Playback
+from bodyplan.show.shapes import bones, extent, scenery, thickness
+from bodyplan.show.stages import few, lanes, shades, stages_of
+
+
+def scene(playback: Playback) -> dict[str, Any]:
+    """The replay's data; arrays are base64 of little-endian float32."""
+    robot = playback.motion.robot
+    joined = bones(robot)
+    frames = sorted(
+        {robot.frame_index(c.frame) for c in robot.contacts} | {i for pair in joined for i in pair} | {0}
+    )
+    place = {frame: i for i, frame in enumerate(frames)}
+    tracks = [p for p in (playback.planned, playback.executed) if p is not None]
+    low, high = extent([p[:, frames] for p in tracks], robot, frames)
+    stages = stages_of(playback)
+    return {
+        "t": packed(playback.t),
+        "bodies": len(frames),
+        "planned": _track(playback, playback.planned[:, frames], playback.planned_centre),
+        "executed": None
+        if playback.executed is None or playback.executed_centre is None
+        else _track(playback, playback.executed[:, frames], playback.executed_centre),
+        "shapes": _shapes(robot, place),
+        "bones": [[place[a], place[b]] for a, b in joined],
+        "boneRadius": thickness(robot, playback.planned),
+        "ground": _ground(playback, low, high),
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "reach": float(np.linalg.norm(np.ptp(playback.planned[0, frames, :3], axis=0))) or 0.1,
+        "stages": [
+            {"name": name, "start": start, "end": end, "lane": lane, "shade": shade}
+            for (name, start, end), lane, shade in zip(stages, lanes(stages), shades(stages), strict=True)
+        ],
+        "showStages": few(stages, playback.cycles),
+        "period": playback.period,
+        "cycles": playback.cycles,
+        "begin": float(playback.t[0]),
+    }
+
+
+def packed(values: Array) -> str:
+    """Numbers as base64 of little-endian float32."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def script_json(data: Any) -> str:
+    """JSON that may stand inside a script element, whatever texts are in it."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _track(playback: Playback, poses: Array, centre: Array) -> dict[str, Any]:
+    return {
+        "count": len(poses),
+        "poses": packed(poses),
+        "centre": packed(centre),
+        "advance": packed(playback.advance(centre)),
+    }
+
+
+def _shapes(robot: Robot, place: dict[int, int]) -> list[dict[str, Any]]:
+    return [
+        {
+            "body": place[robot.frame_index(c.frame)],
+            "kind": c.shape,
+            "radius": c.radius,
+            "start": list(c.start),
+            "end": list(c.end if c.shape == "capsule" else c.start),
+            "half": list(c.half),
+        }
+        for c in robot.contacts
+    ]
+
+
+def _ground(playback: Playback, low: Array, high: Array) -> dict[str, Any]:
+    found = scenery(playback.motion.ground, low, high)
+    return {
+        "planes": [np.round(corners, 6).tolist() for corners in found.planes],
+        "faces": [
+            {
+                "corners": np.round(f.corners, 6).tolist(),
+                "normal": np.round(f.normal, 6).tolist(),
+                "box": f.box,
+                "role": f.role,
+            }
+            for f in found.faces
+        ],
+        "fields": [
+            {"x": packed(x), "y": packed(y), "z": packed(z), "nx": len(x), "ny": len(y)}
+            for x, y, z in found.fields
+        ],
+    }

@@ -1,0 +1,166 @@
+"""A robot and its ground as drawable shapes, for the replay and for flat figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.ground.base import Ground, Solid
+from bodyplan.robot.elements import Contact
+from bodyplan.robot.model import Robot
+from bodyplan.spatial.rotations import rotate
+
+#: corners of a unit box, and its six faces by corner with their outward axis and sign
+CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+FACES = (
+    ((0, 1, 3, 2), 0, -1.0),
+    ((4, 6, 7, 5), 0, 1.0),
+    ((0, 4, 5, 1), 1, -1.0),
+    ((2, 3, 7, 6), 1, 1.0),
+    ((0, 2, 6, 4), 2, -1.0),
+    ((1, 5, 7, 3), 2, 1.0),
+)
+#: most samples along a side of a height field in a picture
+MOST_SIDE = 56
+
+
+def bones(robot: Robot) -> list[tuple[int, int]]:
+    """Pairs of frames (before, after) to join by a line: those whose later frame carries no capsule, which
+    would hide it."""
+    capsules = {contact.frame for contact in robot.contacts if contact.shape == "capsule"}
+    out = []
+    for chain in robot.chains:
+        before = robot.frame_index(chain.parent)
+        for i in range(len(chain.elements)):
+            name = chain.frame_name(i)
+            after = robot.frame_index(name)
+            if name not in capsules:
+                out.append((before, after))
+            before = after
+    return out
+
+
+def thickness(robot: Robot, poses: Array) -> float:
+    """Radius in m for the bones: a share of the robot's size, and of the contacts' radii where there are
+    any."""
+    size = float(np.linalg.norm(np.ptp(poses[..., :3].reshape(-1, poses.shape[-2], 3)[0], axis=0)))
+    radii = [contact.radius for contact in robot.contacts if contact.radius > 0.0]
+    return min([0.015 * size, *(0.6 * r for r in radii)]) if size > 0.0 else 0.01
+
+
+def extent(poses: Sequence[Array], robot: Robot, frames: Sequence[int] | None = None) -> tuple[Array, Array]:
+    """Corners (3,), (3,) m of a box around robots whose ``frames`` (all by default) have poses (..., f,
+    7)."""
+    chosen = list(range(len(robot.frames)) if frames is None else frames)
+    reach = np.zeros((len(robot.frames), 1))
+    for c in robot.contacts:
+        i = robot.frame_index(c.frame)
+        reach[i] = max(float(reach[i, 0]), c.radius + float(np.linalg.norm(c.half)))
+    places = np.concatenate([p[..., :3].reshape(-1, len(chosen), 3) for p in poses])
+    low = (places - reach[chosen]).min(axis=(0, 1))
+    high = (places + reach[chosen]).max(axis=(0, 1))
+    margin = 0.01 * float(np.linalg.norm(high - low)) + 1e-3
+    return low - margin, high + margin
+
+
+def outline(contact: Contact, pose: Array, axes: tuple[int, int]) -> list[Array]:
+    """Polygons (k, 2) m whose union is a contact's shape seen along the third axis; ``pose`` (7,) of its
+    frame."""
+    flat = list(axes)
+    place = pose[:3] + rotate(pose[3:], np.array(contact.start))
+    if contact.shape == "box":
+        corners = (place + rotate(pose[3:], CORNERS * np.array(contact.half)))[:, flat]
+        return [corners[list(face)] for face, _, _ in FACES]
+    angle = np.linspace(0.0, 2.0 * np.pi, 33)[:-1]
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    if contact.shape == "rim":
+        ring = np.concatenate([circle, np.zeros((len(circle), 1))], axis=1)
+        return [(place + rotate(pose[3:], contact.radius * ring))[:, flat]]
+    last = contact.end if contact.shape == "capsule" else contact.start
+    a, b = place[flat], (pose[:3] + rotate(pose[3:], np.array(last)))[flat]
+    along = b - a
+    length = float(np.hypot(*along))
+    if length < 1e-12:
+        return [a + contact.radius * circle]
+    turn = np.arctan2(along[1], along[0]) + 0.5 * np.pi + np.linspace(0.0, np.pi, 13)
+    cap = contact.radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    return [np.concatenate([a + cap, b - cap])]
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A flat piece of ground: corners (k, 3) m, outward normal (3,), the number of its box."""
+
+    corners: Array
+    normal: Array
+    box: int
+    role: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scenery:
+    """The ground in a box for drawing: planes as quadrilaterals, boxes face by face, fields as grids
+    (x (n,), y (m,), z (m, n))."""
+
+    planes: tuple[Array, ...]
+    faces: tuple[Face, ...]
+    fields: tuple[tuple[Array, Array, Array], ...]
+
+
+def scenery(ground: Ground, low: Array, high: Array) -> Scenery:
+    """The ground around a robot that stays between the corners ``low`` and ``high`` (3,) m: planes reach out
+    widely, boxes are cut off near the robot."""
+    size = float(np.linalg.norm(high - low))
+    wide, near = (np.array([share, share, 0.0]) * size for share in (0.2, 0.03))
+    up = np.array([0.0, 0.0, 0.25 * size])
+    solids = ground.solids(low - wide - 0.1 * up, high + wide + up)
+    planes = [
+        plane for s in solids if s.kind == "plane" for plane in _quadrilateral(s, low - wide, high + wide)
+    ]
+    below, above = low - near - 0.1 * up, high + near + up
+    # what of a wall is under a plane floor would only be drawn over it
+    foot = np.maximum(below, [-np.inf, -np.inf, min((float(p[:, 2].min()) for p in planes), default=-np.inf)])
+    faces = [
+        face
+        for number, solid in enumerate(solids)
+        if solid.kind == "box"
+        for face in _box(solid, number, foot if solid.role == "wall" else below, above)
+    ]
+    fields = [_grid(s) for s in solids if s.kind == "field" and s.z is not None]
+    return Scenery(tuple(planes), tuple(faces), tuple(fields))
+
+
+def _quadrilateral(solid: Solid, low: Array, high: Array) -> list[Array]:
+    normal = rotate(np.array(solid.quaternion), np.array([0.0, 0.0, 1.0]))
+    if abs(normal[2]) < 1e-6:
+        return []
+    corners = np.array(
+        [[low[0], low[1], 0.0], [high[0], low[1], 0.0], [high[0], high[1], 0.0], [low[0], high[1], 0.0]]
+    )
+    at = np.array(solid.position)
+    corners[:, 2] = at[2] - ((corners[:, :2] - at[:2]) @ normal[:2]) / normal[2]
+    return [corners]
+
+
+def _box(solid: Solid, number: int, low: Array, high: Array) -> list[Face]:
+    at, half, turn = (np.array(v) for v in (solid.position, solid.half, solid.quaternion))
+    if np.allclose(turn, (1.0, 0.0, 0.0, 0.0)):
+        a, b = np.maximum(at - half, low), np.minimum(at + half, high)
+        if np.any(a >= b):
+            return []
+        at, half = 0.5 * (a + b), 0.5 * (b - a)
+    corners = at + rotate(turn, CORNERS * half)
+    axes = rotate(turn, np.eye(3))
+    return [Face(corners[list(face)], sign * axes[axis], number, solid.role) for face, axis, sign in FACES]
+
+
+def _grid(solid: Solid) -> tuple[Array, Array, Array]:
+    assert solid.z is not None
+    rows, columns = (
+        np.unique(np.linspace(0, n - 1, min(n, MOST_SIDE)).round().astype(int)) for n in solid.z.shape
+    )
+    x, y = solid.position[0] + columns * solid.cell[0], solid.position[1] + rows * solid.cell[1]
+    return x, y, np.asarray(solid.z[np.ix_(rows, columns)])
