@@ -22,7 +22,7 @@ from bodyplan.gaits.cycle import ExtensionCycle
 from bodyplan.gaits.planar import PlanarSnake, level_floor, planar_snake, resting_radius
 from bodyplan.gaits.stretching import BLENDS, StretchingBody, stretching
 from bodyplan.gaits.sweep import ExtensionSweep, LiteralSweep, Sweep
-from bodyplan.ground.base import Ground
+from bodyplan.ground import Corridor, Ground
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
 
@@ -43,7 +43,8 @@ class Concertina(Gait):
     * ``"literal"``: stretch, then contract as IV.B prints it: flat for most of the time, then all at once.
 
     ``stretch_time`` s for one stretching; a whole sweep takes twice as long unless ``max_joint_rate`` (rad/s) sets the
-    time. ``warp``: a time warp that keeps the largest joint rate constant (default: for "travelling" only).
+    time. ``warp``: a time warp that keeps the largest joint rate constant; default: for "travelling", and wherever
+    ``max_joint_rate`` is given.
     ``overlap`` in [0, 1): a stage begins while that share of the one before is still to come (section VI).
     ``rates``: N_B + 2 relative speeds of tail, modules and head. ``blend``: gamma changes evenly ("linear") or by a C2
     quintic ("smooth": accelerations stay finite). ``length_unit``: metres per curve unit; default: the one with which
@@ -141,6 +142,7 @@ class Concertina(Gait):
         steps = snake.lengths[:, None] * np.stack([np.cos(state.angles), np.sin(state.angles)], axis=-1)
         tail = state.tail * unit
         points = np.concatenate([tail[:, None, :], tail[:, None, :] + np.cumsum(steps, axis=1)], axis=1)
+        walls = _wall_overlap(robot, ground, points)
         floor = level_floor(ground, points, "Concertina")
         base = np.zeros((len(t), 7))
         base[:, :2], base[:, 2] = tail, floor + resting_radius(robot)
@@ -155,7 +157,6 @@ class Concertina(Gait):
             )
         status = np.full(len(t), Status.OK.value if body.tight < 0 else Status.TOO_TIGHT.value, dtype="U24")
         facts = body.facts(q, qd, qdd)
-        walls = _wall_overlap(robot, ground, made)
         if walls is not None:
             facts["squeeze"] = 2.0 * walls
         return Motion(
@@ -231,7 +232,8 @@ class ConcertinaBody:
         else:
             extension = gait.extension if gait.contraction == "travelling" else 1.0
             sweep = ExtensionSweep(front, back, extension, sign=1.0 if gait.body_modules % 2 == 0 else -1.0)
-        warp = gait.contraction == "travelling" if gait.warp is None else gait.warp
+        constant_rate = gait.contraction == "travelling" or gait.max_joint_rate is not None
+        warp = constant_rate if gait.warp is None else gait.warp
         cycle = ExtensionCycle(sweep, lengths, gait.waves, 2.0 * gait.stretch_time, gait.max_joint_rate, warp,
                                gait.blend)
         contracted = fit.points[0]
@@ -280,9 +282,17 @@ def robot_length(snake: PlanarSnake) -> float:
 
 
 def _wall_overlap(robot: Robot, ground: Ground, joints: Array) -> float | None:
-    """Deepest planned overlap of the body with the walls of a corridor, m a side; None without walls."""
-    width = getattr(ground, "width", None)
-    if width is None:
+    """Deepest planned overlap of the body with the walls of a corridor, m a side; None without walls.
+
+    InputError where even the middle of the body would be inside a wall.
+    """
+    if not isinstance(ground, Corridor):
         return None
     radius = max((c.radius for c in robot.contacts), default=0.0)
-    return float(np.abs(joints[..., 1]).max()) + radius - 0.5 * float(width)
+    reach = float(np.abs(joints[..., 1]).max())
+    if reach >= 0.5 * ground.width:
+        raise InputError(
+            f"Concertina: the contracted body needs {2.0 * (reach + radius):.4g} m between the walls, the corridor has "
+            f"{ground.width:.4g} m; use more body_modules, a larger omega or shorter links."
+        )
+    return reach + radius - 0.5 * ground.width

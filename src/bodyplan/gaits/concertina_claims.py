@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +11,7 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.gaits.cycle import CycleState
 from bodyplan.gaits.stretching import StretchingBody
-from bodyplan.gaits.sweep import LiteralSweep
+from bodyplan.gaits.sweep import LiteralSweep, Sweep, Window
 from bodyplan.motion import Claim
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 #: m of drift allowed to a part that is at rest exactly
 STILL = 1e-9
+#: share of a link by which a smooth blend, which rounds the kinks of the curve, may leave the curve
+ROUNDED = 0.05
 #: share of a link that the front may drift while it and the rear are anchored together: the sum of two shapes keeps
 #: its length exactly only where they do not overlap
 NEARLY_STILL = 0.005
@@ -78,7 +82,8 @@ def _curve_claim(
         "pose": pose[samples],
         "flip": flip,
         "frames": frames,
-        "tolerance": 1e-9 * float(body.snake.lengths.sum()),
+        "tolerance": ROUNDED * float(body.snake.lengths.min()) if body.gait.blend == "smooth"
+        else 1e-9 * float(body.snake.lengths.sum()),
     })
 
 
@@ -90,24 +95,26 @@ def _at_rest(body: ConcertinaBody, t: Array) -> list[Claim]:
     stations = body.contracted[:, 0]
     mirrored = stations[-1] - stations[::-1]
     begins = np.concatenate([[0.0], (0.5 + np.arange(gait.body_modules + 1)) * np.pi / gait.omega])
+    nearly = NEARLY_STILL * float(body.snake.lengths.min())
+    still = nearly if gait.blend == "smooth" else STILL
     out = []
-    for window, wave, start, end in cycle.windows():
+    alone = {w.name: w for w in _undisturbed(sweep)}
+    for window, wave, start, end in cycle.windows(tuple(alone.values())):
         if window.stretching:
             if wave != gait.waves - 1 or start >= switch - 1e-12:
                 continue
             end = min(end, switch)
             resting = np.flatnonzero(stations <= begins[window.parameter] + 1e-12)
-            tolerance, part = STILL, "rear"
+            tolerance, part = still, "rear"
         elif isinstance(sweep, LiteralSweep):
             # y = 0 upstream keeps everything flat until the tail's own stage
             resting = np.array([n]) if window.parameter == 0 else np.arange(n + 1)
-            tolerance, part = STILL, "front"
+            tolerance, part = still, "front"
         else:
             if wave != 0:
                 continue
             resting = n - np.flatnonzero(mirrored <= begins[window.parameter] + body.lead + 1e-12)[::-1]
-            tolerance = NEARLY_STILL * float(body.snake.lengths.min())
-            part = "front"
+            tolerance, part = nearly, "front"
         if start >= t[-1] or end <= start:
             continue
         out.append(Claim("at_rest", f"{part} at rest: {window.name}", {
@@ -119,6 +126,19 @@ def _at_rest(body: ConcertinaBody, t: Array) -> list[Claim]:
             "tolerance": tolerance,
         }))
     return out
+
+
+def _undisturbed(sweep: Sweep) -> list[Window]:
+    """Stages cut to the time in which no stage nearer to the resting part moves: stages may overlap."""
+    literal = isinstance(sweep, LiteralSweep)
+    out = []
+    for stretch in (True, False):
+        group = [w for w in sweep.windows if w.stretching == stretch]
+        if stretch or literal:  # the moving part grows towards the anchor
+            out += [replace(w, end=min(w.end, after.start)) for w, after in pairwise(group)] + group[-1:]
+        else:  # the resting part grows behind the anchored head
+            out += group[:1] + [replace(w, start=max(w.start, before.end)) for before, w in pairwise(group)]
+    return [w for w in out if w.end > w.start]
 
 
 def _closes(body: ConcertinaBody, t: Array) -> list[Claim]:
@@ -152,6 +172,10 @@ def notes_of(gait: Concertina, body: ConcertinaBody, walls: float | None) -> tup
     else:
         notes.append("Contraction: a travelling extension wave instead of section IV: the whole body is never stretched "
                      "at once, so that folds grip behind the wave and ahead of it.")
+    if gait.blend == "smooth":
+        notes.append("The body curve has kinks where modules and the flat part meet. gamma changes by a C2 quintic, and "
+                     "the joint angles are a C2 spline through the fitted ones, so that accelerations are finite; joints "
+                     "leave the curve by a few per cent of a link while they round a kink.")
     if body.lead > 0.0:
         notes.append(f"The links are longer than the contracted curve: {body.lead * body.unit * 1e3:.3g} mm of the body "
                      "stay straight.")

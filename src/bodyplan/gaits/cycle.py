@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,19 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.errors import InputError
+from bodyplan.gaits.clock import Clock, constant_rate_pace
 from bodyplan.gaits.sweep import Sweep, Window
 
 #: even nodes of the table behind the time warp, per sweep
 TABLE = 1200
+#: what the largest joint rate may be above the largest one found
+PEAK_MARGIN = 1.0005
+#: knots per unit of progress of the rounded angles of a smooth blend
+ROUNDING = 24
 #: share of the mean joint speed that softens the warp where the body stands still for an instant
 SOFTENING = {"linear": 1e-3, "smooth": 0.3}
+
+Shape = Callable[[Array], tuple[Array, Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -32,12 +39,14 @@ class CycleState:
 
 
 class ExtensionCycle:
-    """``waves`` sweeps in flight, each 1/waves of a sweep behind the next; the cycle repeats after ``period`` s.
+    """``waves`` sweeps in flight, each 1/waves of a sweep's time behind the next; the cycle repeats after ``period`` s.
 
     Until the rearmost wave lands the tail end is anchored, from then on the head end. ``lengths`` (n,) of the links
-    in curve units. ``warp``: run through the sweep so that the largest joint rate is constant; else evenly.
-    ``duration`` s of a whole sweep, or ``max_joint_rate`` rad/s, which then sets it.
-    ``blend`` says how smooth the sweep is itself.
+    in curve units. ``warp``: run so that the largest joint rate is constant (a single sweep first, which sets how waves
+    are spaced; then their sum); else evenly through u. ``duration`` s of a whole sweep, or ``max_joint_rate`` rad/s,
+    which then sets it. ``blend`` "smooth" rounds the angles to a C2 spline, so that accelerations are finite.
+
+    Position p in [0, span] of the cycle: the front wave is at p of its sweep's own clock, which runs to 2 T.
     """
 
     def __init__(
@@ -50,124 +59,132 @@ class ExtensionCycle:
         warp: bool,
         blend: str,
     ) -> None:
-        self.sweep, self.lengths, self.waves = sweep, lengths, waves
-        self.span = 2.0 * sweep.total / waves
-        landing = sweep.total - sweep.landing_start
-        launching = sweep.launch_end + sweep.total
+        self.sweep, self.lengths, self.waves, self.blend = sweep, lengths, waves, blend
+        self.whole = 2.0 * sweep.total
+        self.span = self.whole / waves
+        plain = Clock(np.array([0.0, self.whole]), np.ones(2), self.whole)
+        self._sweep_clock = plain
+        if warp and waves > 1:
+            self._sweep_clock = self._warped(self._nodes(1), self._one, self.whole)
+        landing = self.whole - self._place(sweep.landing_start)
+        launching = self._place(sweep.launch_end)
         if waves > 1 and landing + launching > self.span * (1.0 + 1e-12):
             raise InputError(
                 f"waves: {waves} waves of this extension would launch before the last has landed; use a smaller "
                 "extension or fewer waves."
             )
+        self._rounded = self._round() if blend == "smooth" else None
         #: the head is anchored from here on
         self.switch = self.span - landing
-        self.nodes = self._nodes()
-        speeds = np.abs(np.diff(self._shape(self.nodes)[1], axis=1)).max(axis=1)
-        peak = float(speeds.max())
+        nodes = self._nodes(waves)
+        self.clock = Clock(nodes, np.ones_like(nodes), duration / waves)
         if warp:
-            mean = float(np.trapezoid(speeds, self.nodes) / self.span)
-            softened = np.hypot(speeds, SOFTENING[blend] * mean)
-            clock = np.concatenate([[0.0], np.cumsum(0.5 * (softened[1:] + softened[:-1]) * np.diff(self.nodes))])
-            # largest of (joint speed by u) * (du/dt), in units where the clock is unscaled
-            peak = float((speeds / softened).max())
-        else:
-            clock = self.nodes.copy()
-        natural = clock[-1]
-        self.period = natural * peak / max_joint_rate if max_joint_rate is not None else duration / waves
-        self._clock = clock * (self.period / natural)
-        self._warped = warp
-        self._position = self._interpolant() if warp else None
-        if warp and max_joint_rate is not None:
-            self._rescale(max_joint_rate)
+            self.clock = self._warped(nodes, self._shape, duration / waves)
+        if max_joint_rate is not None:
+            self.clock = self.clock.scaled(self.clock.period * self._peak_rate() / max_joint_rate)
+        self.period = self.clock.period
         ends = self._shape(np.array([0.0, self.switch, self.span]))[0]
         reach = np.stack([(lengths * np.cos(ends)).sum(axis=1), (lengths * np.sin(ends)).sum(axis=1)], axis=1)
         self._head_at_switch = reach[1]
         self.advance = reach[1] - reach[2]
 
-    def _nodes(self) -> Array:
-        """Even nodes, and a pair around every u at which a stage of some wave begins or ends."""
-        edges = np.array([edge for w in self.sweep.windows for edge in (w.start, w.end)])
-        edges = np.concatenate([edges, [self.sweep.launch_end, self.sweep.landing_start]]) + self.sweep.total
-        folded = np.concatenate([edges - k * self.span for k in range(self.waves)])
-        folded = folded[(folded > 0.0) & (folded < self.span)]
-        tiny = 1e-9 * self.span
-        even = np.linspace(0.0, self.span, max(TABLE // self.waves, 200))
-        nodes = np.unique(np.concatenate([even, folded - tiny, folded, folded + tiny]))
-        keep = np.concatenate([[True], np.diff(nodes) > 0.5 * tiny])
-        nodes = nodes[keep]
-        nodes[-1] = self.span
+    def _place(self, u: float) -> float:
+        """Position of a u on the sweep's own clock, in [0, 2 T]."""
+        return self._sweep_clock.time(u + self.sweep.total)
+
+    def _nodes(self, waves: int) -> Array:
+        """Even positions of a cycle of some waves, and every one at which a stage of a wave begins or ends."""
+        span = self.whole / waves
+        edges = [edge for w in self.sweep.windows for edge in (w.start, w.end)]
+        places = np.array([self._place(u) for u in (*edges, self.sweep.launch_end, self.sweep.landing_start)])
+        folded = np.concatenate([places - k * span for k in range(waves)])
+        folded = folded[(folded > 0.0) & (folded < span)]
+        nodes = np.unique(np.concatenate([np.linspace(0.0, span, max(TABLE // waves, 200)), folded]))
+        nodes = nodes[np.concatenate([[True], np.diff(nodes) > 1e-9 * span])]
+        nodes[-1] = span
         return np.asarray(nodes)
 
-    def _shape(self, position: Array) -> tuple[Array, Array, Array]:
-        """Angles and derivatives by position in [0, span], ascending: waves add as differences from the contracted
-        body."""
-        total = self.sweep.total
-        contracted = self.sweep.at(np.array([-total]))[0]
+    def _warped(self, nodes: Array, shape: Shape, period: float) -> Clock:
+        speeds = np.abs(np.diff(shape(nodes)[1], axis=1)).max(axis=1)
+        return Clock(nodes, constant_rate_pace(nodes, speeds, SOFTENING[self.blend]), period)
+
+    def _one(self, position: Array) -> tuple[Array, Array, Array]:
+        """Angles of one wave and their derivatives by position on the sweep's clock."""
+        u, p1, p2 = self._sweep_clock.position(position)
+        angles, first, second = self.sweep.at(u - self.sweep.total)
+        p1, p2 = p1[:, None], p2[:, None]
+        return angles, first * p1, second * p1**2 + first * p2
+
+    def _sum(self, position: Array) -> tuple[Array, Array, Array]:
+        """Angles on the curves themselves: waves add as differences from the contracted body."""
+        contracted = self.sweep.at(np.array([-self.sweep.total]))[0]
         angles = np.broadcast_to(contracted, (len(position), len(self.lengths))).copy()
         first, second = np.zeros_like(angles), np.zeros_like(angles)
         for k in range(self.waves):
-            a, b, c = self.sweep.at(np.minimum(position + (k * self.span - total), total))
+            a, b, c = self._one(np.minimum(position + k * self.span, self.whole))
             angles += a - contracted
             first += b
             second += c
         return angles, first, second
 
-    def _interpolant(self) -> Callable[..., Any]:
-        from scipy.interpolate import PchipInterpolator
+    def _shape(self, position: Array) -> tuple[Array, Array, Array]:
+        """Angles and derivatives by position in [0, span], ascending."""
+        if self._rounded is None:
+            return self._sum(position)
+        return self._rounded(position), self._rounded(position, 1), self._rounded(position, 2)
 
-        # some nodes of the neighbouring cycles, so that the speed is continuous across the seam
-        clock, nodes = self._clock, self.nodes
-        ends = slice(-12, -1), slice(1, 12)
-        around = np.concatenate([clock[ends[0]] - self.period, clock, clock[ends[1]] + self.period])
-        values = np.concatenate([nodes[ends[0]] - self.span, nodes, nodes[ends[1]] + self.span])
-        return PchipInterpolator(around, values)  # type: ignore[no-any-return]
+    def _round(self) -> Callable[..., Any]:
+        """The C2 periodic spline through the exact angles at ROUNDING knots a unit of progress: joints that pass a kink
+        of the curve (where its modules and its flat part meet) would jump in rate however smoothly gamma changes."""
+        from scipy.interpolate import CubicSpline
 
-    def _rescale(self, max_joint_rate: float) -> None:
-        """Make the largest joint rate of the interpolated warp the wanted one."""
-        fine = np.linspace(0.0, self.period, 4 * TABLE + 1)
-        at = np.concatenate([fine, self._clock])
-        at.sort()
-        rates = self.state(at[at < self.period], advance=False).rates
-        factor = float(np.abs(np.diff(rates, axis=1)).max()) / max_joint_rate
-        self.period *= factor
-        self._clock = self._clock * factor
-        self._position = self._interpolant()
+        knots = np.linspace(0.0, self.span, max(16, round(ROUNDING * self.span)) + 1)
+        angles = self._sum(knots)[0]
+        angles[-1] = angles[0]
+        return CubicSpline(knots, angles, bc_type="periodic")  # type: ignore[no-any-return]
+
+    def _peak_rate(self) -> float:
+        """Largest joint rate, found on a grid and once more around its peaks; PEAK_MARGIN for what lies between."""
+        step = self.clock.period / (4 * TABLE)
+        at = np.unique(np.concatenate([np.arange(4 * TABLE) * step, self.clock.times[:-1]]))
+        peaks = at[np.argsort(self._largest_rates(at))[-8:]]
+        around = (peaks[:, None] + np.linspace(-step, step, 41)).ravel() % self.clock.period
+        return float(self._largest_rates(np.sort(around)).max()) * PEAK_MARGIN
+
+    def _largest_rates(self, local: Array) -> Array:
+        position, speed, _ = self.clock.position(local)
+        return np.asarray(np.abs(np.diff(self._shape(position)[1], axis=1)).max(axis=1) * speed)
 
     def time_of(self, position: float) -> float:
         """Time in [0, period] at which the cycle is at a position in [0, span]."""
-        return float(np.interp(position, self.nodes, self._clock))
+        return self.clock.time(position)
 
-    def state(self, t: Array, advance: bool = True) -> CycleState:
+    def state(self, t: Array) -> CycleState:
         """The body at times t (S,) s, ascending, t >= 0."""
         number = np.floor(t / self.period * (1.0 + 1e-15) + 1e-12)
         local = np.clip(t - number * self.period, 0.0, self.period)
-        if self._position is None:
-            speed = self.span / self.period
-            position, p1, p2 = local * speed, np.full(len(t), speed), np.zeros(len(t))
-        else:
-            position = np.clip(self._position(local), 0.0, self.span)
-            p1, p2 = self._position(local, 1), self._position(local, 2)
+        position, p1, p2 = self.clock.position(local)
         order = np.argsort(position, kind="stable")
         angles, first, second = (np.empty((len(t), len(self.lengths))) for _ in range(3))
         angles[order], first[order], second[order] = self._shape(position[order])
         rates = first * p1[:, None]
         accelerations = second * (p1**2)[:, None] + first * p2[:, None]
-        tail = np.zeros((len(t), 2))
-        if advance:
-            reach = np.stack([(self.lengths * np.cos(angles)).sum(axis=1),
-                              (self.lengths * np.sin(angles)).sum(axis=1)], axis=1)
-            tail = number[:, None] * self.advance + np.where(
-                (position > self.switch)[:, None], self._head_at_switch - reach, 0.0
-            )
-        return CycleState(angles, rates, accelerations, tail, number, position - self.sweep.total)
+        reach = np.stack(
+            [(self.lengths * np.cos(angles)).sum(axis=1), (self.lengths * np.sin(angles)).sum(axis=1)], axis=1
+        )
+        headed = (position > self.switch)[:, None]
+        tail = number[:, None] * self.advance + np.where(headed, self._head_at_switch - reach, 0.0)
+        u = self._sweep_clock.position(position)[0] - self.sweep.total
+        return CycleState(angles, rates, accelerations, tail, number, u)
 
-    def windows(self) -> list[tuple[Window, int, float, float]]:
-        """Every stage of every wave inside one cycle: (window, wave counted from the front, start, end) in s."""
+    def windows(self, stages: Sequence[Window] | None = None) -> list[tuple[Window, int, float, float]]:
+        """Every stage of every wave inside one cycle: (window, wave counted from the front, start, end) in s;
+        ``stages`` of the sweep (default: all)."""
         out = []
         for k in range(self.waves):
-            shift = k * self.span - self.sweep.total  # u of wave k at position 0
-            for w in self.sweep.windows:
-                a, b = max(w.start - shift, 0.0), min(w.end - shift, self.span)
+            for w in self.sweep.windows if stages is None else stages:
+                a = max(self._place(w.start) - k * self.span, 0.0)
+                b = min(self._place(w.end) - k * self.span, self.span)
                 if b > a:
                     out.append((w, k, self.time_of(a), self.time_of(b)))
         return sorted(out, key=lambda item: (item[2], item[1]))

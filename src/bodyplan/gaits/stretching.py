@@ -89,14 +89,14 @@ def _ramps(s: float, initial: Array, final: Array, start: Array, duration: Array
             f = 1.0
         elif x >= 0.0:
             if blend == 1:  # the C2 quintic: rates and accelerations vanish at both ends
-                f = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+                f = min(x * x * x * (10.0 + x * (6.0 * x - 15.0)), 1.0)
                 f1 = 30.0 * x * x * (1.0 - x) * (1.0 - x)
                 f2 = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
             else:
                 f, f1 = x, 1.0
         reach = final[i] - initial[i]
         # exact at the ends: a stretched tail must be 0, not 1e-17
-        out[i, 0] = final[i] if x >= 1.0 else initial[i] + reach * f
+        out[i, 0] = final[i] if f >= 1.0 else initial[i] + reach * f
         out[i, 1] = reach * f1 / duration[i]
         out[i, 2] = reach * f2 / (duration[i] * duration[i])
 

@@ -137,7 +137,7 @@ class ExtensionSweep:
     ``extension`` = D/G in (0, 1], ``sign`` +1 for even N_B; -1 for odd, whose contracted curve is its own mirror
     image (x -> -x) instead of its own point reflection.
 
-    Raises InputError when the stretching does not lengthen the body all the way.
+    Raises InputError when extension < 1 and the stretching does not lengthen the body all the way.
     """
 
     def __init__(self, front: StretchingBody, back: StretchingBody, extension: float, sign: float = 1.0) -> None:
@@ -145,7 +145,8 @@ class ExtensionSweep:
         total = self.total = front.stages.total
         grid = np.linspace(0.0, total, 257)
         extents = front.at(grid).extents[:, 0]
-        if np.any(np.diff(extents) < -1e-12 * extents[-1]):
+        whole = extension >= 1.0
+        if not whole and np.any(np.diff(extents) < -1e-12 * extents[-1]):
             worst = grid[int(np.argmin(np.diff(extents)))]
             raise InputError(
                 f"the body shortens while it stretches (at {worst / total:.0%} of the stretching): an extension wave "
@@ -155,7 +156,6 @@ class ExtensionSweep:
         self.gain = float(longest - shortest)
         #: extent(s) + extent(r) in transit
         self.target = float(longest + shortest + extension * self.gain)
-        whole = extension >= 1.0
         self.s_launch = total if whole else self._invert(front, self.target - longest)
         self.r_landing = total if whole else self._invert(back, self.target - longest)
         self.launch_end = self.s_launch - total
