@@ -127,19 +127,20 @@ def _losses(trial: Trial, playback: Playback) -> str:
 
 
 def _loss_in_words(trial: Trial, playback: Playback) -> str:
-    if trial.ratio is None:
+    ratio = trial.advance_ratio
+    if ratio is None:
         return SLIP
     planned = float(playback.planned_advance.mean())
-    lost = (1.0 - trial.ratio) * planned
+    lost = (1.0 - ratio) * planned
     if lost <= 0.0:
-        return f"The executed advance is no shorter than the planned one ({percent(trial.ratio)}). {SLIP}"
+        return f"The executed advance is no shorter than the planned one ({percent(ratio)}). {SLIP}"
     most = listed(
         f"{esc(row.name)} ({figure(row.lag, 'm', 3)})" for row in worst(stage_rows(playback, trial))
     )
     cycle = "a cycle" if playback.period is not None else "in all"
     return (
         f"<b>{figure(lost, 'm', 3)} of the planned {figure(planned, 'm')} {cycle} "
-        f"({percent(1.0 - trial.ratio)}) are lost</b>{f', most of it in {most}' if most else ''}. {SLIP}"
+        f"({percent(1.0 - ratio)}) are lost</b>{f', most of it in {most}' if most else ''}. {SLIP}"
     )
 
 

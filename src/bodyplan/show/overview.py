@@ -90,12 +90,12 @@ def _physics(outcome: Outcome) -> tuple[str, str]:
         return "Not executed in physics", "plain"
     if not trial.ok:
         return f"✗ Physics {esc(trial.status)}: {esc(trial.reason)}", "bad"
-    if trial.ratio is None:
+    if trial.advance_ratio is None:
         return (
             f"Physics executed it, at a mean speed of {figure(trial.speed, 'm/s', 3)}; no advance is planned",
             "plain",
         )
-    return f"Physics executed {percent(trial.ratio)} of the planned advance", "plain"
+    return f"Physics executed {percent(trial.advance_ratio)} of the planned advance", "plain"
 
 
 def tiles(outcome: Outcome, playback: Playback) -> str:
