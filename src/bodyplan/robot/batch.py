@@ -1,10 +1,12 @@
-"""From what a user passes to what a kernel takes: joint arrays, base poses, batch shapes."""
+"""From what a user passes to what a kernel takes: joint arrays, base poses, batch shapes, threads."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,11 +15,17 @@ from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.elements import Joint, Variable, WheelRadius
 from bodyplan.robot.tables import COS_30
 
+FLOAT = np.dtype(np.float64)
+NO_POSE = np.empty((0, 7))
 IDENTITY_POSE = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+#: configurations from which on a batch is shared between threads, and the multiple that a share is
+SHARED_FROM, SHARE = 8192, 16
 
 
-def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joints: tuple[str, ...]) -> Array:
-    """``q`` as a finite float64 array (..., n)."""
+def joint_array(
+    q: ArrayLike | Mapping[str, ArrayLike], joints: tuple[str, ...], *, kernel_checks: bool = False
+) -> Array:
+    """``q`` as a float64 array (..., n), finite unless a kernel will look at every number anyway."""
     if isinstance(q, Mapping):
         for name in q:
             if name not in joints:
@@ -27,11 +35,11 @@ def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joints: tuple[str, ...])
             raise InputError(f"q: no value for joint {', '.join(missing)}.")
         values = [finite(q[name], f"q[{name!r}]") for name in joints]
         try:
-            columns = np.broadcast_arrays(*values) if values else [np.zeros(())]
+            return np.stack(np.broadcast_arrays(*values), axis=-1) if values else np.zeros((0,))
         except ValueError as error:
             raise InputError(f"q: shapes of the joints' values do not broadcast: {error}.") from error
-        return np.stack(columns, axis=-1) if values else np.zeros((0,))
-    out = finite(q, "q")
+    known = kernel_checks and type(q) is np.ndarray and q.dtype is FLOAT
+    out: Array = q if known else finite(q, "q")  # type: ignore[assignment]
     if out.ndim == 0 or out.shape[-1] != len(joints):
         raise InputError(
             f"q: expected shape (..., {len(joints)}), one column for each joint, got {out.shape}."
@@ -40,10 +48,10 @@ def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joints: tuple[str, ...])
 
 
 def flatten(q: Array, base: ArrayLike | None) -> tuple[tuple[int, ...], Array, Array]:
-    """(batch shape, q (B, n), base (B or 1, 7)) for the kernels, contiguous and writeable."""
+    """(batch shape, q (B n,), base (B or 1, 7), or (0, 7) for None) for the kernels, contiguous and writeable."""
     shape = q.shape[:-1]
     if base is None:
-        return shape, _plain(q.reshape(_size(shape), q.shape[-1])), IDENTITY_POSE
+        return shape, plain(q).reshape(-1), NO_POSE
     pose = base_array(base)
     try:
         shape = np.broadcast_shapes(shape, pose.shape[:-1])
@@ -51,10 +59,10 @@ def flatten(q: Array, base: ArrayLike | None) -> tuple[tuple[int, ...], Array, A
         raise InputError(
             f"base: batch shape {pose.shape[:-1]} does not broadcast with that of q, {q.shape[:-1]}."
         ) from error
-    if pose.ndim == 1:
-        return shape, _plain(q.reshape(_size(shape), q.shape[-1])), pose.reshape(1, 7)
-    flat_q = np.broadcast_to(q, (*shape, q.shape[-1])).reshape(_size(shape), q.shape[-1])
-    return shape, _plain(flat_q), _plain(np.broadcast_to(pose, (*shape, 7)).reshape(_size(shape), 7))
+    flat = plain(np.broadcast_to(q, (*shape, q.shape[-1]))).reshape(-1)
+    if pose.ndim > 1:
+        pose = plain(np.broadcast_to(pose, (*shape, 7)))
+    return shape, flat, pose.reshape(-1, 7)
 
 
 def base_array(base: ArrayLike) -> Array:
@@ -70,10 +78,29 @@ def base_array(base: ArrayLike) -> Array:
     return pose
 
 
-def raise_if_bad(index: int) -> None:
-    """InputError for what a kernel returns when configuration ``index`` is not finite."""
-    if index >= 0:
-        raise InputError(f"q: every value must be finite, configuration {index} is not.")
+def plain(a: Array) -> Array:
+    """C-contiguous and writeable: Numba compiles a kernel once for every kind of array it meets."""
+    return a if a.flags.carray else np.array(a, order="C")
+
+
+def run(q: Array, size: int, kernel: Callable[[int, int], int]) -> None:
+    """Call ``kernel(first, last)`` over ``size`` configurations, large batches in several threads.
+
+    Threads of our own and kernels without the GIL, rather than Numba's prange: that would compile every kernel
+    a second time, and its portable threading layer aborts the process when two threads call it. NUMBA_NUM_THREADS
+    sets their number. InputError for ``q`` when a kernel met a number that is not finite.
+    """
+    threads = min(numba.config.NUMBA_NUM_THREADS, size // (SHARED_FROM // 2))
+    if size < SHARED_FROM or threads < 2:
+        bad = kernel(0, size)
+    else:
+        share = -(-size // threads // SHARE) * SHARE
+        starts = range(0, size, share)
+        with ThreadPoolExecutor(threads) as pool:
+            bad = max(pool.map(lambda first: kernel(first, min(first + share, size)), starts))
+    if bad >= 0:
+        finite(q, "q")
+        raise InputError("q: too large, a variable that it drives is not finite.")
 
 
 def variable(value: Variable, q: Array, column: Mapping[str, int]) -> Any:
@@ -83,12 +110,3 @@ def variable(value: Variable, q: Array, column: Mapping[str, int]) -> Any:
     if isinstance(value, WheelRadius):
         return value.rubber + value.link * COS_30 * np.cos(0.5 * q[..., column[value.joint.name]])
     return np.full(q.shape[:-1], value)
-
-
-def _size(shape: tuple[int, ...]) -> int:
-    return int(np.prod(shape, dtype=np.int64))
-
-
-def _plain(a: Array) -> Array:
-    """C-contiguous and writeable: Numba compiles a kernel once for every kind of array it meets."""
-    return a if a.flags.c_contiguous and a.flags.writeable else np.array(a, order="C")

@@ -11,129 +11,134 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, IntArray
-from bodyplan.robot.tables import BEND, REVOLUTE, STEP
-from bodyplan.robot.values import COSINE, SINE, SLOPE, bend, drive_values, unpack
+from bodyplan.robot.tables import BEND, DRIVE_F, DRIVE_I, ELEMENT_F, ELEMENT_I, HEAD, REVOLUTE, STEP
+from bodyplan.robot.values import (
+    COSINE,
+    COSINE_HALF,
+    PITCH,
+    RATIO,
+    SINE,
+    SLOPE,
+    YAW,
+    bend,
+    drive_values,
+)
 from bodyplan.spatial.coefficients import slope_coefficients
-from bodyplan.spatial.lanes import fma, inlined, lane_count, matrix
+from bodyplan.spatial.lanes import fma, inlined, lane_count, load, strip, table, unload
 
-# rows of M, and of the arc table A: rotation (9), end point (3), E of pitch (6), E of yaw (6)
-X, Y, Z, R = 0, 3, 6, 9
-END, E_PITCH, E_YAW, ARC_ROWS = 9, 12, 18, 24
+# rows of the flat table W: M, the axes x, y, z and the origin r; an arc's rotation (9), end point (3), E of pitch
+# (6) and of yaw (6)
+X, Y, Z, R, ARC_TURN, ARC_END, E_PITCH, E_YAW, WORK = 0, 3, 6, 9, 12, 21, 24, 30, 36
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def jacobian_kernel(
     batch: int,
     q: Array,
     base: Array,
     ints: IntArray,
     floats: Array,
-    path: IntArray,
     position: Array,
     rotation: Array,
     twist: Array,
 ) -> int:
-    """Poses and joint twists of C targets for ``batch`` configurations ``q`` (B n,); ``base`` (B, 7) or (1, 7).
+    """Poses and joint twists of C targets for ``batch`` configurations ``q`` (B n,); ``base`` (B, 7), (1, 7)
+    or, for the identity, (0, 7).
 
     Fills ``position`` (B C 3) and ``rotation`` (B C 9) in the world of the base, ``twist`` (B K 6) body-fixed
     (v, omega) per unit joint rate; any shape of that size. Returns the index of a block with a non-finite
     coordinate, or -1. ``batch = True`` stands for one configuration, compiled without lanes.
     """
     L = lane_count(batch)
-    V, n, C, S, K, most = ints[1], ints[2], path[0], path[1], path[2], path[3]
-    element_i, element_f, drive_i, drive_f = unpack(ints, floats)
-    starts, offsets, steps = path[4 : 5 + C], path[5 + C : 6 + 2 * C], matrix(path, 6 + 2 * C, S, STEP)
-    position, rotation, twist = position.reshape(-1, 3), rotation.reshape(-1, 9), twist.reshape(-1, 6)
-    D, H, A = np.empty((max(V, 1), 4 * L)), np.empty((1, 6 * L)), np.empty(ARC_ROWS * L)
-    M, T = np.empty(12 * L), np.empty((max(most, 1), 6 * L))
-    for first in range(0, batch, L):
-        if not drive_values(q, n, first, batch - 1, drive_i, drive_f, 1.0, D, batch):
+    B, V, n, C, K, most = int(batch), ints[1], ints[2], ints[3], ints[5], ints[6]
+    starts = HEAD + ints[0] * ELEMENT_I + V * DRIVE_I
+    offsets = starts + C + 1
+    steps = offsets + C + 1
+    all_q, positions = strip(q, 0, B * n), strip(position, 0, B * C * 3)
+    rotations, twists = strip(rotation, 0, B * C * 9), strip(twist, 0, B * K * 6)
+    # drives D, columns T of one target, rotations and positions of all, the rows listed above, a sum, the block's q
+    scratch = np.empty((6 * (V + 1 + most) + 12 * C + WORK + 1 + n) * L)
+    at_T, at_turn = 6 * (V + 1) * L, 6 * (V + 1 + most) * L
+    at_place, at_W = at_turn + 9 * C * L, at_turn + 12 * C * L
+    D, T = table(scratch, 0, V + 1, 6 * L), table(scratch, at_T, most, 6 * L)
+    turn, place = table(scratch, at_turn, C, 9 * L), table(scratch, at_place, C, 3 * L)
+    W, total = strip(scratch, at_W, WORK * L), strip(scratch, at_W + WORK * L, L)
+    values = table(scratch, at_W + (WORK + 1) * L, n, L)
+    for first in range(0, B, L):
+        lanes = min(L, B - first)
+        load(all_q, n * first, n, n, lanes, values, batch)
+        if not drive_values(values, ints, floats, 1.0, D, total, batch):
             return first
-        lanes = min(L, batch - first)
         for c in range(C):
-            for l in range(12 * L):
-                M[l] = 0.0
-            for l in range(L):
-                M[X * L + l] = M[(Y + 1) * L + l] = M[(Z + 2) * L + l] = 1.0
-            for i in range(starts[c], starts[c + 1]):
-                _step(steps, i, element_i, element_f, drive_f, D, H, A, M, T, batch)
-            for l in range(lanes):
-                b = first + l
-                for k in range(offsets[c + 1] - offsets[c]):
-                    for r in range(6):
-                        twist[b * K + offsets[c] + k, r] = T[k, r * L + l]
-                _store_pose(M, l, base, min(b, base.shape[0] - 1), position, rotation, b * C + c, L)
+            for k in range(12):
+                for l in range(L):
+                    W[k * L + l] = 1.0 if k == X or k == Y + 1 or k == Z + 2 else 0.0
+            # undo one element after the other: M from the frame at its end to the frame at its start
+            for step in range(ints[starts + c], ints[starts + c + 1]):
+                i = steps + STEP * step
+                f = ELEMENT_F * ints[i + 1]
+                theta, d, a, epsilon = ints[i + 2], ints[i + 3], ints[i + 4], ints[i + 5]
+                if ints[i] == BEND:
+                    bend(theta, d, floats[f], floats[f + 1], D, batch)
+                    _arc_rows(D, floats[f + 2], W, batch)
+                    if d >= 0:
+                        _arc_column(W, E_YAW, D, d, T, ints[i + 7], ints[i + 11], batch)
+                    if theta >= 0:
+                        _arc_column(W, E_PITCH, D, theta, T, ints[i + 6], ints[i + 10], batch)
+                    _arc_back(W, batch)
+                    continue
+                if epsilon >= 0:
+                    _turn_column(W, X, D, epsilon, T, ints[i + 9], ints[i + 13], batch)
+                    _turn_driven(W, Y, Z, D, epsilon, batch)
+                elif floats[f + 7] != 0.0:
+                    _turn_fixed(W, Y, Z, floats[f + 6], floats[f + 7], batch)
+                if ints[i] == REVOLUTE:
+                    g = ints[0] * ELEMENT_F + theta * DRIVE_F + 1
+                    _revolute(W, D, theta, floats[g], floats[f + 1], floats[f + 2], T, ints[i + 6], batch)
+                    continue
+                if a >= 0:
+                    _slide_column(W, X, D, a, T, ints[i + 8], ints[i + 12], batch)
+                    _slide_driven(W, X, D, a, batch)
+                elif floats[f + 2] != 0.0:
+                    _slide_fixed(W, X, floats[f + 2], batch)
+                if d >= 0:
+                    _slide_column(W, Z, D, d, T, ints[i + 7], ints[i + 11], batch)
+                    _slide_driven(W, Z, D, d, batch)
+                elif floats[f + 1] != 0.0:
+                    _slide_fixed(W, Z, floats[f + 1], batch)
+                if theta >= 0:
+                    _turn_column(W, Z, D, theta, T, ints[i + 6], ints[i + 10], batch)
+                    _turn_driven(W, X, Y, D, theta, batch)
+                elif floats[f + 5] != 0.0:
+                    _turn_fixed(W, X, Y, floats[f + 4], floats[f + 5], batch)
+            _invert(W, turn, place, c, batch)
+            if base.shape[0] > 0:
+                _to_world(turn, place, c, base, first, batch)
+            column, width = first * K + ints[offsets + c], ints[offsets + c + 1] - ints[offsets + c]
+            unload(scratch, at_T, 6 * width, lanes, twists, 6 * column, 6 * K, batch)
+        unload(scratch, at_turn, 9 * C, lanes, rotations, 9 * C * first, 9 * C, batch)
+        unload(scratch, at_place, 3 * C, lanes, positions, 3 * C * first, 3 * C, batch)
+    scratch[0] = 0.0
     return -1
 
 
 @inlined
-def _step(
-    steps: IntArray,
-    i: int,
-    element_i: IntArray,
-    element_f: Array,
-    drive_f: Array,
-    D: Array,
-    H: Array,
-    A: Array,
-    M: Array,
-    T: Array,
-    wide: bool,
-) -> None:
-    """Undo one element: M from the frame at its end to the frame at its start, writing its columns."""
-    what, e = steps[i, 0], steps[i, 1]
-    theta, d, a, epsilon = element_i[e, 2], element_i[e, 3], element_i[e, 4], element_i[e, 5]
-    if what == BEND:
-        bend(element_i, element_f, D, e, H, wide)
-        _arc_rows(H, element_f[e, 2], A, wide)
-        if steps[i, 3] >= 0:
-            _arc_column(M, A, E_YAW, D, d, T, steps[i, 3], steps[i, 7], wide)
-        if steps[i, 2] >= 0:
-            _arc_column(M, A, E_PITCH, D, theta, T, steps[i, 2], steps[i, 6], wide)
-        _arc_back(M, A, wide)
-        return
-    if steps[i, 5] >= 0:
-        _turn_column(M, X, D, epsilon, T, steps[i, 5], steps[i, 9], wide)
-        _turn_driven(M, Y, Z, D, epsilon, wide)
-    elif element_f[e, 7] != 0.0:
-        _turn_fixed(M, Y, Z, element_f[e, 6], element_f[e, 7], wide)
-    if what == REVOLUTE:
-        _revolute(M, D, theta, drive_f[theta, 1], element_f[e, 1], element_f[e, 2], T, steps[i, 2], wide)
-        return
-    if steps[i, 4] >= 0:
-        _slide_column(M, X, D, a, T, steps[i, 4], steps[i, 8], wide)
-        _slide_driven(M, X, D, a, wide)
-    elif element_f[e, 2] != 0.0:
-        _slide_fixed(M, X, element_f[e, 2], wide)
-    if steps[i, 3] >= 0:
-        _slide_column(M, Z, D, d, T, steps[i, 3], steps[i, 7], wide)
-        _slide_driven(M, Z, D, d, wide)
-    elif element_f[e, 1] != 0.0:
-        _slide_fixed(M, Z, element_f[e, 1], wide)
-    if steps[i, 2] >= 0:
-        _turn_column(M, Z, D, theta, T, steps[i, 2], steps[i, 6], wide)
-        _turn_driven(M, X, Y, D, theta, wide)
-    elif element_f[e, 5] != 0.0:
-        _turn_fixed(M, X, Y, element_f[e, 4], element_f[e, 5], wide)
-
-
-@inlined
 def _revolute(
-    M: Array, D: Array, v: int, scale: float, d: float, a: float, T: Array, column: int, wide: bool
+    W: Array, D: Array, v: int, scale: float, d: float, a: float, T: Array, column: int, wide: bool
 ) -> None:
     """The usual row in one sweep: slide by constant d and a, the column of theta, turn by theta."""
     L = lane_count(wide)
     for l in range(L):
         s, c = D[v, SINE * L + l], D[v, COSINE * L + l]
-        x0, x1, x2 = M[l], M[L + l], M[2 * L + l]
-        y0, y1, y2 = M[3 * L + l], M[4 * L + l], M[5 * L + l]
-        z0, z1, z2 = M[6 * L + l], M[7 * L + l], M[8 * L + l]
-        r0 = fma(-a, x0, fma(-d, z0, M[9 * L + l]))
-        r1 = fma(-a, x1, fma(-d, z1, M[10 * L + l]))
-        r2 = fma(-a, x2, fma(-d, z2, M[11 * L + l]))
-        M[9 * L + l], M[10 * L + l], M[11 * L + l] = r0, r1, r2
-        M[l], M[L + l], M[2 * L + l] = fma(c, x0, -(s * y0)), fma(c, x1, -(s * y1)), fma(c, x2, -(s * y2))
-        M[3 * L + l], M[4 * L + l], M[5 * L + l] = fma(s, x0, c * y0), fma(s, x1, c * y1), fma(s, x2, c * y2)
+        x0, x1, x2 = W[l], W[L + l], W[2 * L + l]
+        y0, y1, y2 = W[3 * L + l], W[4 * L + l], W[5 * L + l]
+        z0, z1, z2 = W[6 * L + l], W[7 * L + l], W[8 * L + l]
+        r0 = fma(-a, x0, fma(-d, z0, W[9 * L + l]))
+        r1 = fma(-a, x1, fma(-d, z1, W[10 * L + l]))
+        r2 = fma(-a, x2, fma(-d, z2, W[11 * L + l]))
+        W[9 * L + l], W[10 * L + l], W[11 * L + l] = r0, r1, r2
+        W[l], W[L + l], W[2 * L + l] = fma(c, x0, -(s * y0)), fma(c, x1, -(s * y1)), fma(c, x2, -(s * y2))
+        W[3 * L + l], W[4 * L + l], W[5 * L + l] = fma(s, x0, c * y0), fma(s, x1, c * y1), fma(s, x2, c * y2)
         z0, z1, z2 = scale * z0, scale * z1, scale * z2
         T[column, l] = fma(r1, z2, -(r2 * z1))
         T[column, L + l] = fma(r2, z0, -(r0 * z2))
@@ -142,52 +147,54 @@ def _revolute(
 
 
 @inlined
-def _turn_fixed(M: Array, i: int, j: int, c: float, s: float, wide: bool) -> None:
+def _turn_fixed(W: Array, i: int, j: int, c: float, s: float, wide: bool) -> None:
     """Axes i and j turned back by a constant angle."""
     L = lane_count(wide)
     for l in range(L):
         for r in range(3):
-            x, y = M[(i + r) * L + l], M[(j + r) * L + l]
-            M[(i + r) * L + l], M[(j + r) * L + l] = fma(c, x, -(s * y)), fma(s, x, c * y)
+            x, y = W[(i + r) * L + l], W[(j + r) * L + l]
+            W[(i + r) * L + l], W[(j + r) * L + l] = fma(c, x, -(s * y)), fma(s, x, c * y)
 
 
 @inlined
-def _turn_driven(M: Array, i: int, j: int, D: Array, v: int, wide: bool) -> None:
+def _turn_driven(W: Array, i: int, j: int, D: Array, v: int, wide: bool) -> None:
     """Axes i and j turned back by the angle of drive v."""
     L = lane_count(wide)
     for l in range(L):
         s, c = D[v, SINE * L + l], D[v, COSINE * L + l]
         for r in range(3):
-            x, y = M[(i + r) * L + l], M[(j + r) * L + l]
-            M[(i + r) * L + l], M[(j + r) * L + l] = fma(c, x, -(s * y)), fma(s, x, c * y)
+            x, y = W[(i + r) * L + l], W[(j + r) * L + l]
+            W[(i + r) * L + l], W[(j + r) * L + l] = fma(c, x, -(s * y)), fma(s, x, c * y)
 
 
 @inlined
-def _slide_fixed(M: Array, axis: int, length: float, wide: bool) -> None:
+def _slide_fixed(W: Array, axis: int, length: float, wide: bool) -> None:
     L = lane_count(wide)
     for l in range(L):
         for r in range(3):
-            M[(R + r) * L + l] = fma(-length, M[(axis + r) * L + l], M[(R + r) * L + l])
+            W[(R + r) * L + l] = fma(-length, W[(axis + r) * L + l], W[(R + r) * L + l])
 
 
 @inlined
-def _slide_driven(M: Array, axis: int, D: Array, v: int, wide: bool) -> None:
+def _slide_driven(W: Array, axis: int, D: Array, v: int, wide: bool) -> None:
     L = lane_count(wide)
     for l in range(L):
         for r in range(3):
-            M[(R + r) * L + l] = fma(-D[v, l], M[(axis + r) * L + l], M[(R + r) * L + l])
+            W[(R + r) * L + l] = fma(-D[v, l], W[(axis + r) * L + l], W[(R + r) * L + l])
 
 
 @inlined
-def _turn_column(M: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool) -> None:
+def _turn_column(
+    W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool
+) -> None:
     """A turn about an axis through r: (r x w, w), times the slope of its drive."""
     L = lane_count(wide)
     if first:
         T[column] = 0.0
     for l in range(L):
         g = D[v, SLOPE * L + l]
-        x, y, z = g * M[axis * L + l], g * M[(axis + 1) * L + l], g * M[(axis + 2) * L + l]
-        r0, r1, r2 = M[R * L + l], M[(R + 1) * L + l], M[(R + 2) * L + l]
+        x, y, z = g * W[axis * L + l], g * W[(axis + 1) * L + l], g * W[(axis + 2) * L + l]
+        r0, r1, r2 = W[R * L + l], W[(R + 1) * L + l], W[(R + 2) * L + l]
         T[column, l] += fma(r1, z, -(r2 * y))
         T[column, L + l] += fma(r2, x, -(r0 * z))
         T[column, 2 * L + l] += fma(r0, y, -(r1 * x))
@@ -197,99 +204,128 @@ def _turn_column(M: Array, axis: int, D: Array, v: int, T: Array, column: int, f
 
 
 @inlined
-def _slide_column(M: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool) -> None:
+def _slide_column(
+    W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool
+) -> None:
     """A slide along an axis u: (u, 0), times the slope of its drive."""
     L = lane_count(wide)
     if first:
         T[column] = 0.0
     for l in range(L):
         for r in range(3):
-            T[column, r * L + l] += D[v, SLOPE * L + l] * M[(axis + r) * L + l]
+            T[column, r * L + l] += D[v, SLOPE * L + l] * W[(axis + r) * L + l]
 
 
 @inlined
-def _arc_rows(H: Array, length: float, A: Array, wide: bool) -> None:
-    """Rotation, end point and E of an arc (see :func:`bodyplan.robot.rows.arc_matrices`) into A (24 L,)."""
+def _arc_rows(D: Array, length: float, W: Array, wide: bool) -> None:
+    """Rotation, end point and E of the arc in D's last row (see :func:`bodyplan.robot.rows.arc_matrices`)."""
     L = lane_count(wide)
+    h = D.shape[0] - 1
     for l in range(L):
-        p, y, ratio = H[0, l], H[0, L + l], H[0, 5 * L + l]
-        a, b = ratio * H[0, 4 * L + l], 0.5 * ratio * ratio
+        p, y, ratio = D[h, PITCH * L + l], D[h, YAW * L + l], D[h, RATIO * L + l]
+        a, b = ratio * D[h, COSINE_HALF * L + l], 0.5 * ratio * ratio
         c, a1, b1 = slope_coefficients(p * p + y * y, a, b)
         r00, r01, r02 = 1.0 - b * (p * p + y * y), -a * y, a * p
         r10, r11, r12 = a * y, 1.0 - b * y * y, b * p * y
         r20, r21, r22 = -a * p, b * p * y, 1.0 - b * p * p
-        A[l], A[L + l], A[2 * L + l] = r00, r01, r02
-        A[3 * L + l], A[4 * L + l], A[5 * L + l] = r10, r11, r12
-        A[6 * L + l], A[7 * L + l], A[8 * L + l] = r20, r21, r22
-        A[9 * L + l], A[10 * L + l], A[11 * L + l] = length * a, length * b * y, -length * b * p
+        W[ARC_TURN * L + l], W[(ARC_TURN + 1) * L + l], W[(ARC_TURN + 2) * L + l] = r00, r01, r02
+        W[(ARC_TURN + 3) * L + l], W[(ARC_TURN + 4) * L + l], W[(ARC_TURN + 5) * L + l] = r10, r11, r12
+        W[(ARC_TURN + 6) * L + l], W[(ARC_TURN + 7) * L + l], W[(ARC_TURN + 8) * L + l] = r20, r21, r22
+        W[ARC_END * L + l], W[(ARC_END + 1) * L + l], W[(ARC_END + 2) * L + l] = (
+            length * a,
+            length * b * y,
+            -length * b * p,
+        )
         # v: the slope of the end point, turned into the end frame; omega: columns of V(phi)^T
         x0, x1, x2 = length * p * a1, length * p * y * b1, -length * (b + p * p * b1)
-        A[12 * L + l] = r00 * x0 + r10 * x1 + r20 * x2
-        A[13 * L + l] = r01 * x0 + r11 * x1 + r21 * x2
-        A[14 * L + l] = r02 * x0 + r12 * x1 + r22 * x2
-        A[15 * L + l], A[16 * L + l], A[17 * L + l] = b * y, 1.0 - c * y * y, c * p * y
+        W[E_PITCH * L + l] = r00 * x0 + r10 * x1 + r20 * x2
+        W[(E_PITCH + 1) * L + l] = r01 * x0 + r11 * x1 + r21 * x2
+        W[(E_PITCH + 2) * L + l] = r02 * x0 + r12 * x1 + r22 * x2
+        W[(E_PITCH + 3) * L + l], W[(E_PITCH + 4) * L + l], W[(E_PITCH + 5) * L + l] = (
+            b * y,
+            1.0 - c * y * y,
+            c * p * y,
+        )
         x0, x1, x2 = length * y * a1, length * (b + y * y * b1), -length * p * y * b1
-        A[18 * L + l] = r00 * x0 + r10 * x1 + r20 * x2
-        A[19 * L + l] = r01 * x0 + r11 * x1 + r21 * x2
-        A[20 * L + l] = r02 * x0 + r12 * x1 + r22 * x2
-        A[21 * L + l], A[22 * L + l], A[23 * L + l] = -b * p, c * p * y, 1.0 - c * p * p
+        W[E_YAW * L + l] = r00 * x0 + r10 * x1 + r20 * x2
+        W[(E_YAW + 1) * L + l] = r01 * x0 + r11 * x1 + r21 * x2
+        W[(E_YAW + 2) * L + l] = r02 * x0 + r12 * x1 + r22 * x2
+        W[(E_YAW + 3) * L + l], W[(E_YAW + 4) * L + l], W[(E_YAW + 5) * L + l] = (
+            -b * p,
+            c * p * y,
+            1.0 - c * p * p,
+        )
 
 
 @inlined
-def _arc_column(
-    M: Array, A: Array, row: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool
-) -> None:
+def _arc_column(W: Array, row: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool) -> None:
     """E of one variable of an arc, carried to the target: (M v + r x M omega, M omega)."""
     L = lane_count(wide)
     if first:
         T[column] = 0.0
     for l in range(L):
         g = D[v, SLOPE * L + l]
-        vx, vy, vz = g * A[row * L + l], g * A[(row + 1) * L + l], g * A[(row + 2) * L + l]
-        wx, wy, wz = g * A[(row + 3) * L + l], g * A[(row + 4) * L + l], g * A[(row + 5) * L + l]
-        x = M[l] * wx + M[3 * L + l] * wy + M[6 * L + l] * wz
-        y = M[L + l] * wx + M[4 * L + l] * wy + M[7 * L + l] * wz
-        z = M[2 * L + l] * wx + M[5 * L + l] * wy + M[8 * L + l] * wz
-        r0, r1, r2 = M[9 * L + l], M[10 * L + l], M[11 * L + l]
-        T[column, l] += M[l] * vx + M[3 * L + l] * vy + M[6 * L + l] * vz + r1 * z - r2 * y
-        T[column, L + l] += M[L + l] * vx + M[4 * L + l] * vy + M[7 * L + l] * vz + r2 * x - r0 * z
-        T[column, 2 * L + l] += M[2 * L + l] * vx + M[5 * L + l] * vy + M[8 * L + l] * vz + r0 * y - r1 * x
+        vx, vy, vz = g * W[row * L + l], g * W[(row + 1) * L + l], g * W[(row + 2) * L + l]
+        wx, wy, wz = g * W[(row + 3) * L + l], g * W[(row + 4) * L + l], g * W[(row + 5) * L + l]
+        x = W[l] * wx + W[3 * L + l] * wy + W[6 * L + l] * wz
+        y = W[L + l] * wx + W[4 * L + l] * wy + W[7 * L + l] * wz
+        z = W[2 * L + l] * wx + W[5 * L + l] * wy + W[8 * L + l] * wz
+        r0, r1, r2 = W[9 * L + l], W[10 * L + l], W[11 * L + l]
+        T[column, l] += W[l] * vx + W[3 * L + l] * vy + W[6 * L + l] * vz + r1 * z - r2 * y
+        T[column, L + l] += W[L + l] * vx + W[4 * L + l] * vy + W[7 * L + l] * vz + r2 * x - r0 * z
+        T[column, 2 * L + l] += W[2 * L + l] * vx + W[5 * L + l] * vy + W[8 * L + l] * vz + r0 * y - r1 * x
         T[column, 3 * L + l] += x
         T[column, 4 * L + l] += y
         T[column, 5 * L + l] += z
 
 
 @inlined
-def _arc_back(M: Array, A: Array, wide: bool) -> None:
+def _arc_back(W: Array, wide: bool) -> None:
     """M from the end of an arc to its start."""
     L = lane_count(wide)
     for l in range(L):
         for r in range(3):
-            x, y, z = M[r * L + l], M[(3 + r) * L + l], M[(6 + r) * L + l]
-            px = A[l] * x + A[L + l] * y + A[2 * L + l] * z
-            py = A[3 * L + l] * x + A[4 * L + l] * y + A[5 * L + l] * z
-            pz = A[6 * L + l] * x + A[7 * L + l] * y + A[8 * L + l] * z
-            M[r * L + l], M[(3 + r) * L + l], M[(6 + r) * L + l] = px, py, pz
-            M[(9 + r) * L + l] -= A[9 * L + l] * px + A[10 * L + l] * py + A[11 * L + l] * pz
+            x, y, z = W[r * L + l], W[(3 + r) * L + l], W[(6 + r) * L + l]
+            px = W[ARC_TURN * L + l] * x + W[(ARC_TURN + 1) * L + l] * y + W[(ARC_TURN + 2) * L + l] * z
+            py = W[(ARC_TURN + 3) * L + l] * x + W[(ARC_TURN + 4) * L + l] * y + W[(ARC_TURN + 5) * L + l] * z
+            pz = W[(ARC_TURN + 6) * L + l] * x + W[(ARC_TURN + 7) * L + l] * y + W[(ARC_TURN + 8) * L + l] * z
+            W[r * L + l], W[(3 + r) * L + l], W[(6 + r) * L + l] = px, py, pz
+            W[(9 + r) * L + l] -= (
+                W[ARC_END * L + l] * px + W[(ARC_END + 1) * L + l] * py + W[(ARC_END + 2) * L + l] * pz
+            )
 
 
 @inlined
-def _store_pose(
-    M: Array, l: int, base: Array, b: int, position: Array, rotation: Array, row: int, L: int
-) -> None:
-    """Lane ``l``: base seen from the target -> target in the world of the base."""
-    w, x, y, z = base[b, 3], base[b, 4], base[b, 5], base[b, 6]
-    r0, r1, r2 = M[9 * L + l], M[10 * L + l], M[11 * L + l]
-    p0 = -(M[l] * r0 + M[L + l] * r1 + M[2 * L + l] * r2)
-    p1 = -(M[3 * L + l] * r0 + M[4 * L + l] * r1 + M[5 * L + l] * r2)
-    p2 = -(M[6 * L + l] * r0 + M[7 * L + l] * r1 + M[8 * L + l] * r2)
-    for i in range(3):
-        if i == 0:
-            c0, c1, c2 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-        elif i == 1:
-            c0, c1, c2 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-        else:
-            c0, c1, c2 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-        position[row, i] = base[b, i] + c0 * p0 + c1 * p1 + c2 * p2
-        for j in range(3):
-            rotation[row, 3 * i + j] = c0 * M[j * L + l] + c1 * M[(3 + j) * L + l] + c2 * M[(6 + j) * L + l]
+def _invert(W: Array, turn: Array, place: Array, c: int, wide: bool) -> None:
+    """M, the base seen from the target, -> the target seen from the base: rotation by rows, and position."""
+    L = lane_count(wide)
+    for l in range(L):
+        r0, r1, r2 = W[9 * L + l], W[10 * L + l], W[11 * L + l]
+        for i in range(3):
+            x, y, z = W[3 * i * L + l], W[(3 * i + 1) * L + l], W[(3 * i + 2) * L + l]
+            turn[c, 3 * i * L + l], turn[c, (3 * i + 1) * L + l], turn[c, (3 * i + 2) * L + l] = x, y, z
+            place[c, i * L + l] = -fma(x, r0, fma(y, r1, z * r2))
+
+
+@inlined
+def _to_world(turn: Array, place: Array, c: int, base: Array, first: int, wide: bool) -> None:
+    """A pose seen from the base -> seen from the world, for bases (B, 7) or (1, 7)."""
+    L = lane_count(wide)
+    for l in range(L):
+        b = min(first + l, base.shape[0] - 1)
+        w, n0, n1, n2 = base[b, 3], base[b, 4], base[b, 5], base[b, 6]
+        for i in range(3):
+            v0, v1, v2 = turn[c, i * L + l], turn[c, (3 + i) * L + l], turn[c, (6 + i) * L + l]
+            v0, v1, v2 = _rotated(w, n0, n1, n2, v0, v1, v2)
+            turn[c, i * L + l], turn[c, (3 + i) * L + l], turn[c, (6 + i) * L + l] = v0, v1, v2
+        v0, v1, v2 = _rotated(w, n0, n1, n2, place[c, l], place[c, L + l], place[c, 2 * L + l])
+        place[c, l], place[c, L + l], place[c, 2 * L + l] = base[b, 0] + v0, base[b, 1] + v1, base[b, 2] + v2
+
+
+@inlined
+def _rotated(
+    w: float, x: float, y: float, z: float, v0: float, v1: float, v2: float
+) -> tuple[float, float, float]:
+    """v turned by a unit quaternion: v + w t + n x t with t = 2 n x v."""
+    t0, t1, t2 = 2.0 * (y * v2 - z * v1), 2.0 * (z * v0 - x * v2), 2.0 * (x * v1 - y * v0)
+    return v0 + w * t0 + y * t2 - z * t1, v1 + w * t1 + z * t0 - x * t2, v2 + w * t2 + x * t1 - y * t0

@@ -187,10 +187,19 @@ class Robot:
         ``q`` (..., n) rad or m; ``base`` (..., 7) pose of the base in the world (position m, unit quaternion
         wxyz), broadcast against ``q``; the identity when None.
         """
-        shape, flat, pose = batch.flatten(self.vector(q), base)
-        out = np.empty((len(flat) * len(self.frames), 7))
-        batch.raise_if_bad(forward_kernel(len(flat), flat.reshape(-1), pose, *self._tables, out))
-        return Poses(out.reshape(*shape, len(self.frames), 7), self.frames, self._frame_of)
+        q = batch.joint_array(q, self.joints, kernel_checks=True)
+        shape, flat, pose = batch.flatten(q, base)
+        size, F = int(np.prod(shape, dtype=np.int64)), len(self.frames)
+        pose = pose if len(pose) else batch.IDENTITY_POSE
+        out = np.empty((size, F, 7))
+
+        def kernel(first: int, last: int) -> int:
+            base_part = pose if len(pose) == 1 else pose[first:last]
+            part = flat[first * self.n : last * self.n]
+            return int(forward_kernel(last - first, part, base_part, *self._tables, out[first:last]))
+
+        batch.run(q, size, kernel)
+        return Poses(out.reshape(*shape, F, 7), self.frames, self._frame_of)
 
     def velocity_model(self, q: ArrayLike | Mapping[str, ArrayLike]) -> tuple[Array, Array]:
         """(P (..., 6m, 6), Q (..., 6m, n)) of paper *legs* eq. (9) for the m chain ends.
@@ -200,7 +209,7 @@ class Robot:
         prints the opposite order). A chain that hangs on another has the columns of its parent's joints too.
         """
         at = self.ends_and_jacobians(q)
-        return at.carried(), at.stacked(self.n)
+        return at.carried(), at.stacked()
 
     def jacobian(
         self, q: ArrayLike | Mapping[str, ArrayLike], frame: str, *, reference: str = "body"
@@ -213,7 +222,7 @@ class Robot:
         if reference not in ("body", "world"):
             raise InputError(f"reference: must be 'body' or 'world', got {reference!r}.")
         at = self.ends_and_jacobians(q, frames=(frame,))
-        J = at.stacked(self.n)
+        J = at.stacked()
         if reference == "world":
             R = at.rotations[..., 0, :, :]
             J = np.concatenate([R @ J[..., :3, :], R @ J[..., 3:, :]], axis=-2)
@@ -225,13 +234,15 @@ class Robot:
         base: ArrayLike | None = None,
         *,
         frames: Sequence[str] | None = None,
+        out: Reach | None = None,
     ) -> Reach:
         """Poses and compact body-fixed Jacobians of the chain ends (or ``frames``) in one pass: the fast way.
 
-        See :class:`Reach` for the layout. ``base`` as in :meth:`forward`.
+        See :class:`Reach` for the layout; ``base`` as in :meth:`forward`. ``out``: an earlier result for the
+        same frames and batch shape, to be overwritten and returned: no memory is claimed.
         """
-        targets = self.ends if frames is None else tuple(self.frame_index(frame) for frame in frames)
-        return reach(self._tables, self._paths(targets), self.vector(q), base)
+        paths = self._end_paths if frames is None else self._paths(tuple(frames))
+        return reach(paths, q, base, out)
 
     def element_matrices(self, q: ArrayLike | Mapping[str, ArrayLike], frame: str) -> tuple[Array, Array]:
         """(D (..., 6, 6), E (..., 6, 4 or 2)) of the element that ends in ``frame``: paper *legs* eqs.
@@ -252,13 +263,19 @@ class Robot:
         return build_tables(self.chains, self.frames, self._column)
 
     @cached_property
-    def _path_cache(self) -> dict[tuple[int, ...], Paths]:
+    def _end_paths(self) -> Paths:
+        return build_paths(self._tables, self.ends, self.joints)
+
+    @cached_property
+    def _path_cache(self) -> dict[tuple[str, ...], Paths]:
         return {}
 
-    def _paths(self, targets: tuple[int, ...]) -> Paths:
-        if targets not in self._path_cache:
-            self._path_cache[targets] = build_paths(self._tables, targets)
-        return self._path_cache[targets]
+    def _paths(self, frames: tuple[str, ...]) -> Paths:
+        if frames not in self._path_cache:
+            self._path_cache[frames] = build_paths(
+                self._tables, tuple(self.frame_index(f) for f in frames), self.joints
+            )
+        return self._path_cache[frames]
 
     # --- as data --------------------------------------------------------------------------------------------
 

@@ -2,42 +2,57 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
 
 import numpy as np
+from numpy import empty, ndarray
 from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, IntArray
-from bodyplan.robot import batch
+from bodyplan.errors import InputError
+from bodyplan.robot.batch import FLOAT, NO_POSE, SHARED_FROM, flatten, joint_array, run
 from bodyplan.robot.jacobian_kernel import jacobian_kernel
-from bodyplan.robot.tables import Paths, Tables
+from bodyplan.robot.tables import Paths
 from bodyplan.spatial.twists import adjoint_inverse
 
 
-@dataclass(frozen=True, slots=True)
 class Reach:
     """C target frames at a batch of configurations. Arrays, with any leading batch shape:
 
     * ``positions`` (..., C, 3) m and ``rotations`` (..., C, 3, 3), in the world of the base pose;
-    * ``twists`` (..., K, 6): body-fixed (v, omega) of a target per unit rate of one joint. Target c has rows
-      ``offsets[c]:offsets[c + 1]``, one for each joint between the base and it, and ``joints`` (K,) is the
-      joint of every row. :meth:`jacobian` is one target's (..., 6, k).
+    * ``twists`` (..., K, 6): body-fixed (v, omega) of a target per unit rate of one joint. Target c has the rows
+      ``offsets[c]:offsets[c + 1]``, one for each joint between the base and it in the order of the robot's
+      joints; ``joints`` (K,) is the joint of every row. :meth:`jacobian` is one target's (..., 6, k).
     """
 
-    positions: Array
-    rotations: Array
-    twists: Array
-    offsets: IntArray
-    joints: IntArray
+    __slots__ = ("_batch", "_paths", "positions", "rotations", "twists")
+
+    def __init__(self, paths: Paths, shape: tuple[int, ...]) -> None:
+        self._paths, self._batch = paths, shape
+        position, rotation, twist = paths.shapes
+        self.positions = empty(shape + position)
+        self.rotations = empty(shape + rotation)
+        self.twists = empty(shape + twist)
+
+    @property
+    def offsets(self) -> IntArray:
+        """(C + 1,) first row of every target in ``twists``, and their number."""
+        return self._paths.offsets
+
+    @property
+    def joints(self) -> IntArray:
+        """(K,) joint of every row of ``twists``."""
+        return self._paths.joints
 
     def jacobian(self, target: int) -> Array:
         """(..., 6, k): columns for the joints ``joints[offsets[target]:offsets[target + 1]]``; a view."""
         return self.twists[..., self.offsets[target] : self.offsets[target + 1], :].swapaxes(-1, -2)
 
-    def stacked(self, n: int) -> Array:
-        """(..., 6 C, n): the Jacobians of all targets over each other, a column for each of n joints (Q)."""
-        lead, C = self.twists.shape[:-2], len(self.offsets) - 1
-        out = np.zeros((*lead, 6 * C, n))
+    def stacked(self) -> Array:
+        """(..., 6 C, n): the Jacobians of all targets over each other, a column for every joint (Q)."""
+        C = len(self.offsets) - 1
+        out = np.zeros((*self._batch, 6 * C, self._paths.one[0]))
         for c in range(C):
             span = slice(self.offsets[c], self.offsets[c + 1])
             out[..., 6 * c : 6 * c + 6, self.joints[span]] = self.twists[..., span, :].swapaxes(-1, -2)
@@ -49,15 +64,53 @@ class Reach:
         each = adjoint_inverse(self.positions, self.rotations)
         return each.reshape(*each.shape[:-3], 6 * each.shape[-3], 6)
 
+    def __repr__(self) -> str:
+        return f"Reach(batch={self._batch}, targets={len(self.offsets) - 1}, columns={len(self.joints)})"
 
-def reach(tables: Tables, paths: Paths, q: Array, base: ArrayLike | None) -> Reach:
-    """Poses and joint twists of the targets of ``paths`` at ``q`` (..., n)."""
-    shape, flat, pose = batch.flatten(q, base)
-    C, K = len(paths.offsets) - 1, len(paths.joints)
-    # one configuration is a kernel of its own; the kernels take the batch as one axis
-    size, lead = (len(flat), (len(flat),)) if shape else (True, ())
-    position, rotation, twist = np.empty((*lead, C, 3)), np.empty((*lead, C, 3, 3)), np.empty((*lead, K, 6))
-    batch.raise_if_bad(jacobian_kernel(size, flat.reshape(-1), pose, *tables, paths.ints, position, rotation, twist))
-    if len(shape) > 1:
-        position, rotation, twist = (a.reshape(*shape, *a.shape[1:]) for a in (position, rotation, twist))
-    return Reach(position, rotation, twist, paths.offsets, paths.joints)
+
+def reach(
+    paths: Paths,
+    q: ArrayLike | Mapping[str, ArrayLike],
+    base: ArrayLike | None,
+    out: Reach | None,
+) -> Reach:
+    """Poses and joint twists of the targets of ``paths``, into ``out`` where given."""
+    if base is None and type(q) is ndarray and q.dtype is FLOAT and q.flags.carray:
+        # Nothing to convert. One vector, as in a control loop, has a kernel of its own.
+        if q.shape == paths.one:
+            at = _result(paths, (), out)
+            if (
+                jacobian_kernel(
+                    True, q, NO_POSE, paths.ints, paths.floats, at.positions, at.rotations, at.twists
+                )
+                < 0
+            ):
+                return at
+        elif q.ndim == 2 and q.shape[1:] == paths.one and len(q) < SHARED_FROM:
+            at = _result(paths, q.shape[:1], out)
+            arrays = at.positions, at.rotations, at.twists
+            if jacobian_kernel(len(q), q.reshape(-1), NO_POSE, paths.ints, paths.floats, *arrays) < 0:
+                return at
+    q = joint_array(q, paths.names, kernel_checks=True)
+    shape, flat, pose = flatten(q, base)
+    at = _result(paths, shape, out)
+    size, n, rank = math.prod(shape), paths.one[0], len(shape)
+    arrays = tuple(a.reshape(size, *a.shape[rank:]) for a in (at.positions, at.rotations, at.twists))
+
+    def kernel(first: int, last: int) -> int:
+        bases = pose if len(pose) < 2 else pose[first:last]
+        parts = (a[first:last] for a in arrays)
+        return int(
+            jacobian_kernel(last - first, flat[first * n : last * n], bases, paths.ints, paths.floats, *parts)
+        )
+
+    run(q, size, kernel)
+    return at
+
+
+def _result(paths: Paths, shape: tuple[int, ...], out: Reach | None) -> Reach:
+    if out is None:
+        return Reach(paths, shape)
+    if type(out) is not Reach or out._paths is not paths or out._batch != shape:
+        raise InputError(f"out: expected a result for the same frames with batch shape {shape}, got {out!r}.")
+    return out

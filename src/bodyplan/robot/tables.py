@@ -18,42 +18,49 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray, frozen
 from bodyplan.robot.elements import Arc, Chain, Joint, WheelRadius
 
+# ints: F, V, n, C, S, K, M, then element_i (F, 6), drive_i (V, 3), starts (C + 1), offsets (C + 1), steps (S, 14)
+# floats: element_f (F, 12), drive_f (V, 2)
+HEAD = 7
 # element_i: kind, parent frame, drive of variable 0..3 (-1: constant)
 # element_f: constants 0..3 (an arc has its length in 2), then cosine and sine of theta and of epsilon, then those
 #            of their halves
 ELEMENT_I, ELEMENT_F = 6, 12
 # drive_i: joint, law, kind of variable;  drive_f: value = f0 + f1 q (LINEAR) or f0 + f1 cos(q/2) (WHEEL)
 DRIVE_I, DRIVE_F = 3, 2
-# step: what to do, element, column of variable 0..3 (-1: none), 1 where this is the column's first use
-STEP = 10
+# step: what to do, element; for each variable its drive, its column (both -1: constant), 1 at a column's first use
+STEP = 14
 
 ROW, ARC = 1, 2
 LINEAR, WHEEL = 0, 1
 ROW_ANGLE, OTHER = 1, 0
-# what to do in a step: nothing but constants; one revolute theta; any drives; an arc
+# what to do in a step: only constants; one revolute theta; any drives; an arc
 FIXED, REVOLUTE, GENERAL, BEND = 0, 1, 2, 3
 COS_30 = float(np.sqrt(0.75))
 
 
 class Tables(NamedTuple):
-    """All elements and drives. ``ints``: F, V, n, then element_i (F, 6), drive_i (V, 3). ``floats``: element_f
-    (F, 12), drive_f (V, 2)."""
+    """All elements and drives: F frames, V drives, n joints."""
 
     ints: IntArray
     floats: Array
 
 
 class Paths(NamedTuple):
-    """The ways from C target frames back to the base, and the K joint columns they need.
+    """The ways from C target frames back to the base in S steps, and the K joint columns they need, at most M for
+    one target. Target c has the steps starts[c]:starts[c + 1] and the columns offsets[c]:offsets[c + 1].
 
-    ``ints``: C, steps in all, K, most columns of a target, then starts (C + 1,), offsets (C + 1,), steps (S, 10):
-    target c has the steps starts[c]:starts[c + 1] and the columns offsets[c]:offsets[c + 1].
-    ``joints`` (K,): joint of every column, ascending within a target.
+    ``ints`` holds the tables as well. ``joints`` (K,): joint of every column, ascending within a target;
+    ``names``: all joints; ``one``: (n,), the shape of one configuration; ``shapes``: those of its results, positions,
+    rotations and twists.
     """
 
     ints: IntArray
+    floats: Array
     offsets: IntArray
     joints: IntArray
+    names: tuple[str, ...]
+    one: tuple[int]
+    shapes: tuple[tuple[int, ...], ...]
 
 
 def build_tables(chains: tuple[Chain, ...], frames: tuple[str, ...], column: Mapping[str, int]) -> Tables:
@@ -87,17 +94,17 @@ def build_tables(chains: tuple[Chain, ...], frames: tuple[str, ...], column: Map
             element_f.append([*values, *trig])
             parent = len(element_i) - 1
     return Tables(
-        _joined([len(element_i), len(drive_i), len(column)], element_i, drive_i),
+        _joined([len(element_i), len(drive_i), len(column), 0, 0, 0, 0], element_i, drive_i),
         frozen(np.concatenate([np.ravel(element_f), np.ravel(drive_f)])),
     )
 
 
-def build_paths(tables: Tables, targets: tuple[int, ...]) -> Paths:
+def build_paths(tables: Tables, targets: tuple[int, ...], joint_names: tuple[str, ...]) -> Paths:
     """Paths from ``targets`` (frame numbers) to the base; a joint that drives several variables on one path
     has one column there."""
     F, V = (int(i) for i in tables.ints[:2])
-    element_i = tables.ints[3 : 3 + F * ELEMENT_I].reshape(F, ELEMENT_I)
-    drive_i = tables.ints[3 + F * ELEMENT_I :].reshape(V, DRIVE_I)
+    element_i = tables.ints[HEAD : HEAD + F * ELEMENT_I].reshape(F, ELEMENT_I)
+    drive_i = tables.ints[HEAD + F * ELEMENT_I :].reshape(V, DRIVE_I)
     starts, offsets = [0], [0]
     steps: list[list[int]] = []
     joints: list[int] = []
@@ -120,15 +127,24 @@ def build_paths(tables: Tables, targets: tuple[int, ...]) -> Paths:
                     slots[k] = columns[int(drive_i[v, 0])]
                     firsts[k] = int(slots[k] not in met)
                     met.add(slots[k])
-            steps.append([_what(element_i[e], drive_i, slots, firsts), e, *slots, *firsts])
+            what = _what(element_i[e], drive_i, slots, firsts)
+            steps.append([what, e, *element_i[e, 2:], *slots, *firsts])
         starts.append(len(steps))
         offsets.append(offsets[-1] + len(columns))
         joints.extend(names)
     most = int(max(np.diff(offsets), default=0))
+    head = [*tables.ints[:3], len(targets), len(steps), len(joints), most]
+    ints = _joined(head, tables.ints[HEAD:], starts, offsets, steps)
+    C, K = len(targets), len(joints)
+    shapes = (C, 3), (C, 3, 3), (K, 6)
     return Paths(
-        _joined([len(targets), len(steps), len(joints), most], starts, offsets, steps),
+        ints,
+        tables.floats,
         _frozen_int(offsets),
         _frozen_int(joints),
+        joint_names,
+        (len(joint_names),),
+        shapes,
     )
 
 

@@ -31,7 +31,8 @@ _NODES = np.array(GAUSS_NODES)
 # the six nodes of two half steps: weights that extrapolate their polynomial to the start, and the gap there
 _SIX = np.concatenate([0.5 * _NODES, 0.5 + 0.5 * _NODES])
 TO_START = tuple(
-    float(np.prod([0.0 - x for x in _SIX if x != xi]) / np.prod([xi - x for x in _SIX if x != xi])) for xi in _SIX
+    float(np.prod([0.0 - x for x in _SIX if x != xi]) / np.prod([xi - x for x in _SIX if x != xi]))
+    for xi in _SIX
 )
 OUTER = float(_SIX[0])
 Vector = tuple[float, float, float]

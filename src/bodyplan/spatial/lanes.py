@@ -13,16 +13,18 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
-from numba.extending import intrinsic, overload, register_jitable
+from numba.core.errors import NumbaTypeError
+from numba.extending import intrinsic, overload
+from numba.np import arrayobj
 
 from bodyplan.arrays import Array
 
 LANES = 16
 #: |x| up to which :func:`sincos` holds; beyond, use math.sin and math.cos
-SINCOS_LIMIT = 1e8
+SINCOS_LIMIT = 2.0**26
 
 #: for the small functions inside kernels: no call, no cache file of their own
-inlined = njit(nogil=True, forceinline=True)
+inlined = njit(nogil=True, forceinline=True, error_model="numpy")
 
 
 def lane_count(wide: Any) -> int:
@@ -66,10 +68,18 @@ def sincos(x: float) -> tuple[float, float]:
     y = fma(-k, _HALF_PI_LOW, fma(-k, _HALF_PI_HIGH, x))
     z = y * y
     p = fma(z, fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08), 2.75573137070700676789e-06)
-    p = fma(z, fma(z, fma(z, p, -1.98412698298579493134e-04), 8.33333333332248946124e-03), -1.66666666666666324348e-01)
+    p = fma(
+        z,
+        fma(z, fma(z, p, -1.98412698298579493134e-04), 8.33333333332248946124e-03),
+        -1.66666666666666324348e-01,
+    )
     s = fma(y * z, p, y)
     p = fma(z, fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09), -2.75573143513906633035e-07)
-    p = fma(z, fma(z, fma(z, p, 2.48015872894767294178e-05), -1.38888888888741095749e-03), 4.16666666666666019037e-02)
+    p = fma(
+        z,
+        fma(z, fma(z, p, 2.48015872894767294178e-05), -1.38888888888741095749e-03),
+        4.16666666666666019037e-02,
+    )
     c = fma(z * z, p, fma(z, -0.5, 1.0))
     quadrant = np.float64(t).view(np.int64)
     odd = (quadrant & 1) != 0
@@ -85,10 +95,10 @@ def sincos(x: float) -> tuple[float, float]:
 def sines(D: Array, row: int, value: int, sine: int, cosine: int, factor: float, wide: Any) -> None:
     """Sine and cosine of ``factor`` times the lanes of row ``row`` of D (rows, columns) that start at column
     ``value``, into those that start at columns ``sine`` and ``cosine``."""
-    huge = False
+    total = 0.0
     for i in range(lane_count(wide)):
-        huge |= abs(D[row, value + i]) > SINCOS_LIMIT
-    if huge:
+        total += abs(D[row, value + i])
+    if not total < SINCOS_LIMIT:
         for i in range(lane_count(wide)):
             x = factor * D[row, value + i]
             D[row, sine + i], D[row, cosine + i] = math.sin(x), math.cos(x)
@@ -97,7 +107,97 @@ def sines(D: Array, row: int, value: int, sine: int, cosine: int, factor: float,
             D[row, sine + i], D[row, cosine + i] = sincos(factor * D[row, value + i])
 
 
-@register_jitable
-def matrix(flat: Array, start: int, rows: int, columns: int) -> Array:
-    """The table (rows, columns) that begins at ``start`` of a flat array: a view."""
-    return flat[start : start + rows * columns].reshape(rows, columns)
+def _borrowed(array: Any, dimensions: int) -> tuple[Any, Any]:
+    """Type of a view into the contiguous ``array``, and the code that makes it from a start and a shape."""
+    if not isinstance(array, types.Array) or array.layout != "C":
+        raise NumbaTypeError("needs a C-contiguous array")
+    result = types.Array(array.dtype, dimensions, "C", readonly=not array.mutable)
+
+    def build(context: Any, builder: ir.IRBuilder, signature: Any, args: Any) -> Any:
+        source = context.make_array(array)(context, builder, value=args[0])
+        size = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(array.dtype)))
+        out = context.make_array(result)(context, builder)
+        shape = list(args[2:])
+        strides = [builder.mul(shape[-1], size), size][-dimensions:]
+        data = builder.gep(source.data, [args[1]])
+        arrayobj.populate_array(out, data, shape, strides, size, meminfo=None, parent=None)
+        return out._getvalue()
+
+    return result, build
+
+
+@intrinsic
+def table(typing: Any, flat: Any, start: Any, rows: Any, columns: Any) -> Any:
+    """The table (rows, columns) that begins at entry ``start`` of a contiguous array of any shape.
+
+    Not counted as a reference, because counting costs more than a row of lanes: ``flat`` must stay in use, by a
+    later statement, for as long as the table is.
+    """
+    result, build = _borrowed(flat, 2)
+    return result(flat, types.intp, types.intp, types.intp), build
+
+
+@intrinsic
+def strip(typing: Any, flat: Any, start: Any, size: Any) -> Any:
+    """The ``size`` entries from ``start`` on of a contiguous array; as :func:`table`."""
+    result, build = _borrowed(flat, 1)
+    return result(flat, types.intp, types.intp), build
+
+
+@intrinsic
+def _transpose4(typing: Any, source: Any, i: Any, step: Any, target: Any, j: Any, stride: Any) -> Any:
+    """target[j + b stride + a] = source[i + a step + b] for a, b < 4, in vector registers."""
+
+    def build(context: Any, builder: ir.IRBuilder, signature: Any, args: Any) -> Any:
+        start = [
+            context.make_array(t)(context, builder, value=args[k]).data for k, t in ((0, source), (3, target))
+        ]
+        vector, index = ir.VectorType(ir.DoubleType(), 4), ir.IntType(64)
+
+        def at(k: int, n: int) -> Any:
+            offset = builder.add(args[3 * k + 1], builder.mul(args[3 * k + 2], index(n)))
+            return builder.bitcast(builder.gep(start[k], [offset]), vector.as_pointer())
+
+        def mixed(a: Any, b: Any, lanes: list[int]) -> Any:
+            return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), 4), lanes))
+
+        rows = [builder.load(at(0, n), align=8) for n in range(4)]
+        even, odd, low, high = [0, 4, 2, 6], [1, 5, 3, 7], [0, 1, 4, 5], [2, 3, 6, 7]
+        pairs = [mixed(rows[k], rows[k + 1], lanes) for k in (0, 2) for lanes in (even, odd)]
+        for n, (a, lanes) in enumerate(((0, low), (1, low), (0, high), (1, high))):
+            builder.store(mixed(pairs[a], pairs[a + 2], lanes), at(1, n), align=8)
+        return context.get_dummy_value()
+
+    return types.void(source, types.intp, types.intp, target, types.intp, types.intp), build
+
+
+@inlined
+def unload(
+    rows: Array, first: int, count: int, lanes: int, out: Array, start: int, stride: int, wide: Any
+) -> None:
+    """Give every lane its own numbers: out[start + lane stride + k] = rows[first + k L + lane] for k < ``count``.
+
+    Both arrays are flat. A full block goes through registers four by four.
+    """
+    L = lane_count(wide)
+    fours = count - count % 4 if lanes == L and L > 1 else 0
+    for k in range(0, fours, 4):
+        for l in range(0, L, 4):
+            _transpose4(rows, first + k * L + l, L, out, start + l * stride + k, stride)
+    for l in range(lanes):
+        for k in range(fours, count):
+            out[start + l * stride + k] = rows[first + k * L + l]
+
+
+@inlined
+def load(flat: Array, start: int, stride: int, count: int, lanes: int, rows: Array, wide: Any) -> None:
+    """The inverse of :func:`unload`: rows[k, lane] = flat[start + lane stride + k]; the last of ``lanes`` is
+    repeated to fill the block."""
+    L = lane_count(wide)
+    fours = count - count % 4 if lanes == L and L > 1 else 0
+    for l in range(0, L, 4):
+        for k in range(0, fours, 4):
+            _transpose4(flat, start + l * stride + k, stride, rows, k * L + l, L)
+    for l in range(L):
+        for k in range(fours, count):
+            rows[k, l] = flat[start + min(l, lanes - 1) * stride + k]
