@@ -203,7 +203,7 @@ def test_cycles_are_measured_in_phase_and_at_full_speed() -> None:
     stage = trial.slip_by_stage()["fold"]
     assert stage["along"] == pytest.approx(np.mean([slip.along for slip in trial.slips]))
     assert trial.metrics()["slip_m.fold"] == stage["along"]
-    assert trial.ratio == pytest.approx(np.mean(trial.advance[:, 0]) / 0.05)
+    assert trial.advance_ratio == pytest.approx(np.mean(trial.advance[:, 0]) / 0.05)
 
 
 def test_walls_that_the_plan_presses_into_stand_back_and_close() -> None:
@@ -301,7 +301,7 @@ def test_progress_and_slip_of_records_that_are_known() -> None:
     planned = np.array([[0.05, 0.0, 0.0], [0.0, 0.05, 0.0]])
     found = progress_of(records, planned, 1.0, 1.0)
     np.testing.assert_allclose(found["advance"], [[0.04, 0.01, 0.0]] * 2, atol=1e-15)
-    np.testing.assert_allclose(found["advance_ratio"], [0.8, 0.2], atol=1e-12)
+    np.testing.assert_allclose(found["advance_ratios"], [0.8, 0.2], atol=1e-12)
     np.testing.assert_allclose(found["sideways"], [0.01, -0.04], atol=1e-15)
     assert found["speed"] == pytest.approx(0.025)
     slips = slips_of(motion, records, planned, lambda phase: 1.0 + phase, 1.0)

@@ -16,7 +16,7 @@ from bodyplan.gaits.sweep import Sweep, Window
 #: even nodes of the table behind the time warp, per sweep
 TABLE = 1200
 #: what the largest joint rate may be above the largest one found
-PEAK_MARGIN = 1.0005
+PEAK_MARGIN = 1.002
 #: knots per unit of progress of the rounded angles of a smooth blend
 ROUNDING = 24
 #: share of the mean joint speed that softens the warp where the body stands still for an instant
@@ -36,6 +36,11 @@ class CycleState:
     tail: Array
     number: Array
     u: Array
+
+
+def _largest_speeds(shape: Shape, position: Array) -> Array:
+    """Largest joint speed by position (S,)."""
+    return np.asarray(np.abs(np.diff(shape(position)[1], axis=1)).max(axis=1))
 
 
 class ExtensionCycle:
@@ -93,11 +98,13 @@ class ExtensionCycle:
         return self._sweep_clock.time(u + self.sweep.total)
 
     def _nodes(self, waves: int) -> Array:
-        """Even positions of a cycle of some waves, and every one at which a stage of a wave begins or ends."""
+        """Even positions of a cycle of some waves, and those around every one at which a stage of a wave begins or ends:
+        joints may stand on a kink of the curve there and be fast on one side of it only."""
         span = self.whole / waves
         edges = [edge for w in self.sweep.windows for edge in (w.start, w.end)]
         places = np.array([self._place(u) for u in (*edges, self.sweep.launch_end, self.sweep.landing_start)])
         folded = np.concatenate([places - k * span for k in range(waves)])
+        folded = np.concatenate([folded, [0.0, span]])[:, None] + np.array([-1e-4, 0.0, 1e-4]) * span
         folded = folded[(folded > 0.0) & (folded < span)]
         nodes = np.unique(np.concatenate([np.linspace(0.0, span, max(TABLE // waves, 200)), folded]))
         nodes = nodes[np.concatenate([[True], np.diff(nodes) > 1e-9 * span])]
@@ -105,7 +112,15 @@ class ExtensionCycle:
         return np.asarray(nodes)
 
     def _warped(self, nodes: Array, shape: Shape, period: float) -> Clock:
-        speeds = np.abs(np.diff(shape(nodes)[1], axis=1)).max(axis=1)
+        speeds = _largest_speeds(shape, nodes)
+        # a joint that passes a kink of the curve may be fast between two nodes only: look closer where speeds change
+        change = np.abs(np.diff(speeds)) > 0.03 * speeds.max()
+        cells = np.flatnonzero(change | np.roll(change, 1) | np.roll(change, -1))
+        inner = (nodes[cells, None] + np.diff(nodes)[cells, None] * np.arange(1, 8) / 8.0).ravel()
+        if inner.size:
+            nodes = np.concatenate([nodes, inner])
+            order = np.argsort(nodes)
+            nodes, speeds = nodes[order], np.concatenate([speeds, _largest_speeds(shape, inner)])[order]
         return Clock(nodes, constant_rate_pace(nodes, speeds, SOFTENING[self.blend]), period)
 
     def _one(self, position: Array) -> tuple[Array, Array, Array]:
@@ -153,7 +168,7 @@ class ExtensionCycle:
 
     def _largest_rates(self, local: Array) -> Array:
         position, speed, _ = self.clock.position(local)
-        return np.asarray(np.abs(np.diff(self._shape(position)[1], axis=1)).max(axis=1) * speed)
+        return _largest_speeds(self._shape, position) * speed
 
     def time_of(self, position: float) -> float:
         """Time in [0, period] at which the cycle is at a position in [0, span]."""

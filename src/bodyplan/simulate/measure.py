@@ -85,7 +85,7 @@ def planned_advance(physics: Physics, reference: Reference, cycles: int) -> Arra
 
 
 def progress_of(records: Records, planned: Array, start: float, period: float) -> dict[str, Any]:
-    """``advance``, ``advance_ratio``, ``sideways`` and ``speed`` for Trial."""
+    """``advance``, ``advance_ratios``, ``sideways`` and ``speed`` for Trial."""
     cycles = len(planned)
     centres = at(records.t, records.com, start + period * np.arange(cycles + 1.0))
     advance = np.diff(centres, axis=0)
@@ -95,7 +95,7 @@ def progress_of(records: Records, planned: Array, start: float, period: float) -
     size = np.linalg.norm(planned, axis=1)
     return {
         "advance": advance,
-        "advance_ratio": along / size if np.all(size > NOWHERE) else None,
+        "advance_ratios": along / size if np.all(size > NOWHERE) else None,
         "sideways": np.sum(advance * left, axis=1),
         "speed": float(along.sum() / (cycles * period)),
     }

@@ -135,7 +135,7 @@ def build(
 
 
 def default_servo(robot: Robot) -> dict[str, tuple[float, float]]:
-    """(kp, kv) of every actuated joint: kp = m g L for an angle (N m / rad), 100 m g / L for a length (N /
+    """(kp, kv) of every actuated joint: kp = 2 m g L for an angle (N m / rad), 100 m g / L for a length (N /
     m: 1 % of L under the robot's weight), kv = kp / 50 s. m is the robot's mass, L the longest way along
     its frames from the base at q = 0."""
     rest = robot.forward(np.zeros(robot.n))
@@ -147,7 +147,7 @@ def default_servo(robot: Robot) -> dict[str, tuple[float, float]]:
             way[frame] = way[parent] + float(np.linalg.norm(rest[frame][:3] - rest[parent][:3]))
             parent = frame
     weight, length = robot.mass * 9.81, max(way.values()) or 1.0
-    stiffness = {"angle": weight * length, "length": 100.0 * weight / length}
+    stiffness = {"angle": 2.0 * weight * length, "length": 100.0 * weight / length}
     return {
         name: (stiffness[kind], stiffness[kind] / 50.0)
         for name, kind, driven in zip(robot.joints, robot.kinds, robot.actuated, strict=True)

@@ -50,7 +50,7 @@ def simulate(
     ``friction`` of the floor: a coefficient, or :class:`Friction` (forward, backward, sideways) for scales;
     None: that of the ground, or else of the contact, or else 0.5. Walls keep their own. ``servo``: (kp, kv)
     of all joints, N m / rad and N m s / rad (N / m for lengths), or one such pair by joint name; default kp
-    = m g L with the robot's mass and length, kv = kp / 50 (:func:`bodyplan.simulate.default_servo`); torque
+    = 2 m g L with the robot's mass and length, kv = kp / 50 (:func:`bodyplan.simulate.default_servo`); torque
     is limited to the joint's effort. ``dt`` s: time step. ``record_dt`` s: between records. ``progress``:
     called with the part done in [0, 1]; True draws a bar in the terminal. ``armature``, ``arc_joints`` and
     ``self_collision``: see :func:`bodyplan.simulate.build`.

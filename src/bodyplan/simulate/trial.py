@@ -40,7 +40,7 @@ class Trial:
 
     The measured part begins at ``start_time`` s and has ``cycles`` whole cycles of ``period`` s.
     ``planned_advance`` (cycles, 3) and ``advance`` (cycles, 3) m: displacement of the centre of mass a
-    cycle. ``advance_ratio`` (cycles,): executed over planned, along the planned direction; None where none
+    cycle. ``advance_ratios`` (cycles,): executed over planned, along the planned direction; None where none
     is planned. ``sideways`` (cycles,) m: horizontal, positive to the left of the planned direction.
     ``speed`` m/s: mean, along the planned direction. ``slips``: see :class:`Slip`.
 
@@ -66,7 +66,7 @@ class Trial:
     cycles: int
     planned_advance: Array
     advance: Array | None = None
-    advance_ratio: Array | None = None
+    advance_ratios: Array | None = None
     sideways: Array | None = None
     speed: float | None = None
     slips: tuple[Slip, ...] = ()
@@ -94,10 +94,14 @@ class Trial:
         return self.status == Status.OK.value
 
     @property
-    def ratio(self) -> float | None:
-        """Advance executed / planned, mean over the cycles; None where none is planned or the run
-        diverged."""
-        return None if self.advance_ratio is None else float(self.advance_ratio.mean())
+    def advance_ratio(self) -> float | None:
+        """Advance executed / planned, mean over the cycles; None where none is planned or the run diverged."""
+        return None if self.advance_ratios is None else float(self.advance_ratios.mean())
+
+    @property
+    def peak_torque(self) -> float | None:
+        """Largest torque (N m; force in N) of any joint in the measured part; None where the run diverged."""
+        return None if self.torque_peak is None else float(self.torque_peak.max(initial=0.0))
 
     def slip_by_stage(self) -> dict[str, dict[str, float]]:
         """Stage -> ``along`` (m a cycle: summed over its claims, mean over cycles) and ``largest`` (m), in
@@ -121,12 +125,12 @@ class Trial:
             "planned_advance_m": planned,
             "planned_speed_m_s": planned / self.period,
             "advance_m": None if self.speed is None else self.speed * self.period,
-            "advance_ratio": self.ratio,
+            "advance_ratio": self.advance_ratio,
             "sideways_m": None if self.sideways is None else float(self.sideways.mean()),
             "speed_m_s": self.speed,
         }
         for i in range(self.cycles):
-            ratio = None if self.advance_ratio is None else float(self.advance_ratio[i])
+            ratio = None if self.advance_ratios is None else float(self.advance_ratios[i])
             out[f"advance_ratio_cycle_{i + 1}"] = ratio
         for kind, unit, load in (("angle", "rad", "torque_Nm"), ("length", "m", "force_N")):
             mine = np.array([k == kind for k in self.kinds], dtype=bool)
@@ -157,7 +161,7 @@ class Trial:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        ratio = "" if self.ratio is None else f", advance {self.ratio:.3g} of the plan"
+        ratio = "" if self.advance_ratio is None else f", advance {self.advance_ratio:.3g} of the plan"
         return f"Trial({self.status}, {self.cycles} cycles of {self.period:.3g} s{ratio})"
 
 
