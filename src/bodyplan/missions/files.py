@@ -132,7 +132,8 @@ class _Source:
             return model.model_validate(data)
         except ValidationError as error:
             # of a choice of types, the table's own errors say more than "not a number"
-            first = max(error.errors(include_url=False), key=lambda e: e["type"] in ("extra_forbidden", "missing"))
+            rank = {"extra_forbidden": 2, "missing": 1}
+            first = max(error.errors(include_url=False), key=lambda e: rank.get(e["type"], 0))
             place = (*section, *_named(model, first["loc"]))
             field = ".".join(str(p) for p in place)
             if first["type"] == "extra_forbidden":
