@@ -25,7 +25,19 @@ def test_honest_motion_passes_every_line(motion):
     report = bp.check(motion)
     assert report and report.ok and not report.failures and report.raise_if_failed() is report
     kinds = {line.kind for line in report}
-    assert {"solved", "residual", "lengths", "on_curve", "at_rest", "periodic", "rates", "limits", "self", "ground", "presses"} <= kinds
+    assert {
+        "solved",
+        "residual",
+        "lengths",
+        "on_curve",
+        "at_rest",
+        "periodic",
+        "rates",
+        "limits",
+        "self",
+        "ground",
+        "presses",
+    } <= kinds
     assert "checks passed" in str(report) and report.to_dict()["ok"] is True
     assert report["joint limits"].value > 0.0
     with pytest.raises(KeyError, match="there are"):
@@ -88,14 +100,19 @@ def test_spoiled_claims_are_caught(motion):
 
 
 def test_what_cannot_be_tested_says_so(motion):
-    short = motion.replace(**{f: getattr(motion, f)[:50] for f in ("t", "base", "q", "qd", "qdd", "residual", "status")},
-                           claims=[c for c in motion.claims if c.kind == "periodic"])
+    short = motion.replace(
+        **{f: getattr(motion, f)[:50] for f in ("t", "base", "q", "qd", "qdd", "residual", "status")},
+        claims=[c for c in motion.claims if c.kind == "periodic"],
+    )
     line = bp.check(short)["the cycle closes"]
     assert line.passed is None and "shorter" in line.detail and "not tested" in str(line)
 
 
 @settings(max_examples=60, deadline=None)
-@given(data=st.lists(st.floats(-1.0, 1.0), min_size=12, max_size=12), degenerate=st.sampled_from(["no", "point", "parallel"]))
+@given(
+    data=st.lists(st.floats(-1.0, 1.0), min_size=12, max_size=12),
+    degenerate=st.sampled_from(["no", "point", "parallel"]),
+)
 def test_segment_distance_against_a_grid(data, degenerate):
     p, q = np.array(data).reshape(2, 2, 3)
     if degenerate == "point":

@@ -1,5 +1,7 @@
 """The concertina curve: continuity, kinks, flat part and arc length, against independent computations."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,8 +15,15 @@ gammas = st.lists(st.floats(0.0, 0.95), min_size=1, max_size=6)
 
 
 @settings(max_examples=60, deadline=None)
-@given(body=gammas, head=st.floats(0.0, 0.95), tail=st.floats(0.0, 1.0), omega=st.floats(0.3, 3.0),
-       rule=st.sampled_from(["cut", "product", "natural"]), crossing=st.integers(1, 4), lead=st.sampled_from([0.0, 0.7]))
+@given(
+    body=gammas,
+    head=st.floats(0.0, 0.95),
+    tail=st.floats(0.0, 1.0),
+    omega=st.floats(0.3, 3.0),
+    rule=st.sampled_from(["cut", "product", "natural"]),
+    crossing=st.integers(1, 4),
+    lead=st.sampled_from([0.0, 0.7]),
+)
 def test_continuous_everywhere(body, head, tail, omega, rule, crossing, lead):
     curve = ConcertinaCurve(body, head, tail=tail, omega=omega, rule=rule, crossing=crossing, lead=lead)
     at = np.concatenate([curve.breaks, [lead]])
@@ -44,7 +53,9 @@ def test_amplitudes_follow_the_value_at_the_junction():
     head = (np.pi / 2 + len(body) * np.pi) / omega
     assert curve(head) == pytest.approx(value, abs=1e-14)
     # eq. (7) with /omega everywhere
-    assert curve.flat_from == pytest.approx(head + (2 * np.pi - np.arccos(0.2)) / (omega * np.sqrt(1 - 0.04)), abs=1e-13)
+    assert curve.flat_from == pytest.approx(
+        head + (2 * np.pi - np.arccos(0.2)) / (omega * np.sqrt(1 - 0.04)), abs=1e-13
+    )
 
 
 def test_cut_follows_the_module_to_its_own_first_zero():
@@ -93,8 +104,11 @@ def test_arclength_is_the_integral_of_the_slope(body, head, tail, omega):
     curve = ConcertinaCurve(body, head, tail=tail, omega=omega)
     x = 0.83 * curve.flat_from
     edges = [0.0, *[b for b in curve.breaks if b < x], x]
-    expected = sum(quad(lambda s: float(np.hypot(1.0, curve.slope(s))), a, b, epsabs=1e-13, epsrel=1e-13, limit=200)[0]
-                   for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a)
+    expected = sum(
+        quad(lambda s: float(np.hypot(1.0, curve.slope(s))), a, b, epsabs=1e-13, epsrel=1e-13, limit=200)[0]
+        for a, b in pairwise(edges)
+        if b > a
+    )
     assert curve.arclength(x) == pytest.approx(expected, rel=2e-12)
     assert curve.arclength(curve.flat_from + 2.0) - curve.arclength(curve.flat_from) == pytest.approx(2.0, abs=1e-12)
 
@@ -129,11 +143,22 @@ def test_offset_of_points_on_and_off_the_curve():
         from_parameters("concertino", {})
 
 
-@pytest.mark.parametrize("changes", [
-    {"body_gammas": []}, {"body_gammas": [0.1, 1.2]}, {"body_gammas": [np.nan]}, {"head_gamma": -0.1}, {"omega": 0.0},
-    {"crossing": 0}, {"crossing": 1.5}, {"rule": "cutt"}, {"rule": "natural", "head_gamma": 1.0}, {"lead": -1.0},
-    {"body_gammas": np.zeros((3, 2)), "head_gamma": np.zeros(4)},
-])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"body_gammas": []},
+        {"body_gammas": [0.1, 1.2]},
+        {"body_gammas": [np.nan]},
+        {"head_gamma": -0.1},
+        {"omega": 0.0},
+        {"crossing": 0},
+        {"crossing": 1.5},
+        {"rule": "cutt"},
+        {"rule": "natural", "head_gamma": 1.0},
+        {"lead": -1.0},
+        {"body_gammas": np.zeros((3, 2)), "head_gamma": np.zeros(4)},
+    ],
+)
 def test_refuses(changes):
     with pytest.raises(bp.InputError):
         ConcertinaCurve(**{"body_gammas": [0.1, 0.2], "head_gamma": 0.1, **changes})

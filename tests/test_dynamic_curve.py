@@ -48,7 +48,9 @@ def test_regular_at_gamma_one():
     np.testing.assert_allclose(dynamic_curve(x, 1.0 - 1e-12), dynamic_curve(x, 1.0), atol=1e-11)
 
 
-@pytest.mark.parametrize("x,gamma,omega", [(0.3, 0.2, 1.3), (3.0, 0.8, 1.0), (0.01, 0.5, 1.0), (2.5, 0.999, 1.0), (7, 0.01, 2)])
+@pytest.mark.parametrize(
+    "x,gamma,omega", [(0.3, 0.2, 1.3), (3.0, 0.8, 1.0), (0.01, 0.5, 1.0), (2.5, 0.999, 1.0), (7, 0.01, 2)]
+)
 def test_jet_against_forty_digits(x, gamma, omega):
     def at(*order):
         return float(mp.diff(lambda a, b: printed(a, b, omega), (x, gamma), order))
@@ -77,7 +79,9 @@ def test_broadcasts():
     assert dynamic_curve(np.zeros((0,)), 0.3).shape == (0,)
 
 
-@pytest.mark.parametrize("arguments", [(0.0, 1.1), (0.0, -0.1), (np.nan, 0.3), (0.0, 0.3, 0.0), (0.0, 0.3, -1.0), ("a", 0.3)])
+@pytest.mark.parametrize(
+    "arguments", [(0.0, 1.1), (0.0, -0.1), (np.nan, 0.3), (0.0, 0.3, 0.0), (0.0, 0.3, -1.0), ("a", 0.3)]
+)
 def test_refuses(arguments):
     with pytest.raises(bp.InputError):
         dynamic_curve(*arguments)

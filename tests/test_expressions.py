@@ -86,9 +86,7 @@ def test_powers_with_whole_exponents_are_not_logarithms() -> None:
 
 
 def test_kinks_take_the_derivatives_of_one_side() -> None:
-    np.testing.assert_array_equal(
-        Expression("abs(x)").jet(x=[-1.0, 0.0, 1.0], y=0.0)[1][:, 0], [-1.0, 1.0, 1.0]
-    )
+    np.testing.assert_array_equal(Expression("abs(x)").jet(x=[-1.0, 0.0, 1.0], y=0.0)[1][:, 0], [-1.0, 1.0, 1.0])
     np.testing.assert_array_equal(Expression("max(2*x, x)").jet(x=0.0, y=0.0)[1], [2.0, 0.0])
     np.testing.assert_array_equal(Expression("min(2*x, x)").jet(x=0.0, y=0.0)[1], [2.0, 0.0])
     kinks = Expression("abs(x - 1) + max(x, y)").kinks
@@ -168,9 +166,7 @@ def test_anything_else_is_refused_as_text(text: object) -> None:
 
 
 def test_errors_say_what_and_what_else() -> None:
-    with pytest.raises(
-        InputError, match=r"'x\.real' is not allowed; write numbers, x, y, pi, e, .* sin, cos"
-    ):
+    with pytest.raises(InputError, match=r"'x\.real' is not allowed; write numbers, x, y, pi, e, .* sin, cos"):
         Expression("2 + x.real")
     with pytest.raises(UnknownNameError, match=r"unknown function 'sine'\. Did you mean 'sin'\?"):
         Expression("sine(x)")
@@ -243,9 +239,7 @@ def test_bounds_hold_everywhere_in_the_box(text: str) -> None:
     at = low + rng.uniform(0.0, 1.0, (300, 60, 2)) * (high - low)
     values = expression.jet_or_nan(x=at[..., 0], y=at[..., 1])
     for known, found in zip(bounds, values, strict=True):
-        defined = np.isfinite(values[0]).reshape(*values[0].shape, *(1,) * (found.ndim - 2)) & np.isfinite(
-            found
-        )
+        defined = np.isfinite(values[0]).reshape(*values[0].shape, *(1,) * (found.ndim - 2)) & np.isfinite(found)
         assert np.all((found >= known[0]) | ~defined)
         assert np.all((found <= known[1]) | ~defined)
 
@@ -260,9 +254,7 @@ def test_bounds_close_in_on_small_boxes() -> None:
 
 
 def test_a_box_without_a_defined_point_has_empty_bounds() -> None:
-    z, _, _ = Expression("sqrt(1 - x**2 - y**2)").enclosure(
-        x=([2.0, 0.0], [3.0, 0.1]), y=([0.0, 0.0], [1.0, 0.1])
-    )
+    z, _, _ = Expression("sqrt(1 - x**2 - y**2)").enclosure(x=([2.0, 0.0], [3.0, 0.1]), y=([0.0, 0.0], [1.0, 0.1]))
     assert z[0, 0] == np.inf
     assert z[1, 0] == -np.inf
     assert np.all(np.isfinite(z[:, 1]))

@@ -77,9 +77,7 @@ def test_surface_arguments() -> None:
     ground = Surface(Expression("x + y"), bounds=((0, 1), (0, 2)), friction=0.3)
     assert ground.extent == ((0.0, 1.0), (0.0, 2.0))
     assert ground.expression.text == "x + y"
-    with pytest.raises(
-        InputError, match=r"y = 2\.5 \(index \(1,\)\) is outside; it covers .* y from 0\.0 to 2\.0"
-    ):
+    with pytest.raises(InputError, match=r"y = 2\.5 \(index \(1,\)\) is outside; it covers .* y from 0\.0 to 2\.0"):
         ground.height([0.5, 0.5], [1.0, 2.5])
     with pytest.raises(InputError, match="outside"):
         ground.clearance([1.5, 0.0, 0.0])
@@ -123,9 +121,7 @@ def test_spline_is_exact_on_polynomials(
     ny: int, nx: int, degree_y: int, degree_x: int, rng: np.random.Generator
 ) -> None:
     c = rng.normal(size=(degree_y + 1, degree_x + 1))
-    text = " + ".join(
-        f"({float(c[j, i])!r})*x**{i}*y**{j}" for j in range(degree_y + 1) for i in range(degree_x + 1)
-    )
+    text = " + ".join(f"({float(c[j, i])!r})*x**{i}*y**{j}" for j in range(degree_y + 1) for i in range(degree_x + 1))
     exact = Surface(text)
     x, y = 0.2 + 0.3 * np.arange(nx), -0.7 + 0.25 * np.arange(ny)
     ground = HeightMap(exact.height(x[None, :], y[:, None]), (0.3, 0.25), (0.2, -0.7))
@@ -264,9 +260,7 @@ def test_terrain_says_when_matplotlib_is_missing(monkeypatch: pytest.MonkeyPatch
         HeightMap.jacksboro()
 
 
-@pytest.mark.parametrize(
-    "ground", [Surface("0.05*sin(9*x)*cos(7*y)", friction=0.4), HeightMap.jacksboro(size=0.6)]
-)
+@pytest.mark.parametrize("ground", [Surface("0.05*sin(9*x)*cos(7*y)", friction=0.4), HeightMap.jacksboro(size=0.6)])
 def test_fields_for_physics_follow_the_ground(ground: Ground) -> None:
     (solid,) = ground.solids([-0.2, -0.25, -1.0], [0.25, 0.2, 1.0])
     assert (solid.kind, solid.role, solid.friction) == ("field", "floor", ground.friction)  # type: ignore[attr-defined]

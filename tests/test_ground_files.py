@@ -36,9 +36,7 @@ def png(path: Path, grey: np.ndarray, *, colour: int = 0, size: tuple[int, int] 
         (b"IDAT", zlib.compress(lines)),
         (b"IEND", b""),
     ]
-    body = b"".join(
-        struct.pack(">I", len(d)) + k + d + struct.pack(">I", zlib.crc32(k + d)) for k, d in chunks
-    )
+    body = b"".join(struct.pack(">I", len(d)) + k + d + struct.pack(">I", zlib.crc32(k + d)) for k, d in chunks)
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + body)
     return path
 
@@ -47,9 +45,7 @@ def test_npy(tmp_path: Path) -> None:
     np.save(tmp_path / "m.npy", Z)
     ground = HeightMap.from_file(tmp_path / "m.npy", cell=0.1, origin=(1.0, 2.0), scale=2.0, friction=0.3)
     assert ground == HeightMap(Z, 0.1, (1.0, 2.0), scale=2.0, friction=0.3)
-    assert from_dict({"kind": "height_map", "file": str(tmp_path / "m.npy"), "cell": 0.1}) == HeightMap(
-        Z, 0.1
-    )
+    assert from_dict({"kind": "height_map", "file": str(tmp_path / "m.npy"), "cell": 0.1}) == HeightMap(Z, 0.1)
     with pytest.raises(UnknownNameError, match="cel"):
         from_dict({"kind": "height_map", "file": str(tmp_path / "m.npy"), "cel": 0.1})
     with pytest.raises(InputError, match="give cell="):
@@ -96,9 +92,7 @@ def test_asc_has_the_north_row_first(tmp_path: Path) -> None:
 def test_asc_samples_without_data_are_named_or_filled(tmp_path: Path) -> None:
     file = tmp_path / "m.ASC"
     file.write_text(ASC.format(last=-9999))
-    with pytest.raises(
-        InputError, match="1 samples have no data, the first in row 0 from the south, column 2"
-    ):
+    with pytest.raises(InputError, match="1 samples have no data, the first in row 0 from the south, column 2"):
         HeightMap.from_file(file)
     assert HeightMap.from_file(file, fill=7.0).z[0, 2] == 7.0
 

@@ -78,9 +78,7 @@ def test_nearest_points_on_a_curved_crease(rng: np.random.Generator) -> None:
     for _ in range(5):  # the crease is the curve y = 5 sin(5x): a search along one line
         x = centre + np.linspace(-r, r, 20_001)
         d = np.sqrt(
-            (x - p[:, :1]) ** 2
-            + (5.0 * np.sin(5.0 * x) - p[:, 1:2]) ** 2
-            + (0.3 * np.sin(5.0 * x) - p[:, 2:]) ** 2
+            (x - p[:, :1]) ** 2 + (5.0 * np.sin(5.0 * x) - p[:, 1:2]) ** 2 + (0.3 * np.sin(5.0 * x) - p[:, 2:]) ** 2
         )
         centre, r = np.take_along_axis(x, d.argmin(axis=1)[:, None], axis=1), r / 100.0
     along = d.min(axis=1)

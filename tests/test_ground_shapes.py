@@ -80,9 +80,7 @@ def test_every_batch_shape(ground: Ground, shape: tuple[int, ...]) -> None:
         assert result.shape == shape
         assert isinstance(result, np.ndarray)
     for index in np.ndindex(shape):
-        np.testing.assert_allclose(
-            ground.clearance(p)[index], ground.clearance(p[index]), rtol=1e-13, atol=1e-15
-        )
+        np.testing.assert_allclose(ground.clearance(p)[index], ground.clearance(p[index]), rtol=1e-13, atol=1e-15)
         np.testing.assert_allclose(ground.normal(p)[index], ground.normal(p[index]), rtol=1e-13, atol=1e-15)
     assert ground.height(np.zeros((2, 1)), np.zeros(3)).shape == (2, 3)
 
@@ -123,9 +121,7 @@ def test_tilted_plane() -> None:
     np.testing.assert_allclose(plane.normal(2.0, 3.0), n, rtol=1e-15)
     np.testing.assert_allclose(plane.height(2.0, 3.0), 0.1 + 1.5 - 3.0, rtol=1e-15)
     foot = np.array([2.0, 3.0, 0.1 + 1.5 - 3.0])
-    np.testing.assert_allclose(
-        plane.clearance(foot + n * [[0.4], [0.0], [-0.3]]), [0.4, 0.0, -0.3], atol=1e-15
-    )
+    np.testing.assert_allclose(plane.clearance(foot + n * [[0.4], [0.0], [-0.3]]), [0.4, 0.0, -0.3], atol=1e-15)
     np.testing.assert_array_equal(plane.curvature(2.0, 3.0), [0.0, 0.0])
     np.testing.assert_allclose(plane.gap([0.0, 0.0, 1.0]), 0.9)
     (solid,) = plane.solids([-1.0, -2.0, 0.0], [3.0, 2.0, 1.0])
@@ -187,9 +183,7 @@ def test_profile_distances() -> None:
     assert len(Profile(0.1).breaks) == 0
 
 
-@pytest.mark.parametrize(
-    "ground", [Corridor(0.4, height=0.1, floor=1.0), STAIRS, Profile(0.0, 0.8), Plane(1.0)]
-)
+@pytest.mark.parametrize("ground", [Corridor(0.4, height=0.1, floor=1.0), STAIRS, Profile(0.0, 0.8), Plane(1.0)])
 def test_clearance_is_the_distance_to_the_solids(ground: Ground, rng: np.random.Generator) -> None:
     low, high = np.array([-3.0, -2.0, -1.0]), np.array([6.0, 2.0, 3.0])
     solids = ground.solids(low, high)

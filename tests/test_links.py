@@ -1,5 +1,7 @@
 """Links on a curve by circles: on the curve, one link apart, the nearest ahead; and the exact length."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,9 +14,13 @@ from bodyplan.curves import ConcertinaCurve
 
 @settings(max_examples=60, deadline=None)
 @given(
-    body=st.lists(st.floats(0.0, 0.9), min_size=2, max_size=5), head=st.floats(0.0, 0.9), tail=st.floats(0.0, 1.0),
-    omega=st.floats(0.4, 4.0), rule=st.sampled_from(["cut", "product", "natural"]),
-    lengths=st.lists(st.floats(0.05, 1.6), min_size=1, max_size=12), start=st.floats(0.0, 6.0),
+    body=st.lists(st.floats(0.0, 0.9), min_size=2, max_size=5),
+    head=st.floats(0.0, 0.9),
+    tail=st.floats(0.0, 1.0),
+    omega=st.floats(0.4, 4.0),
+    rule=st.sampled_from(["cut", "product", "natural"]),
+    lengths=st.lists(st.floats(0.05, 1.6), min_size=1, max_size=12),
+    start=st.floats(0.0, 6.0),
 )
 def test_joints_are_on_the_curve_one_link_apart(body, head, tail, omega, rule, lengths, start):
     curve = ConcertinaCurve(body, head, tail=tail, omega=omega, rule=rule)
@@ -33,7 +39,7 @@ def test_nearest_ahead_also_where_a_circle_meets_the_curve_several_times(omega, 
     curve = ConcertinaCurve(gammas, gammas[-1], omega=omega)
     several = 0
     points, _ = bp.links_on_curve(curve, 1.0, 14)
-    for here, there in zip(points[:-1], points[1:], strict=True):
+    for here, there in pairwise(points):
         x = np.linspace(here[0], here[0] + 1.0, 4001)
         inside = np.hypot(x - here[0], curve(x) - here[1]) - 1.0
         crossings = np.flatnonzero((inside[:-1] < 0.0) & (inside[1:] >= 0.0))
@@ -52,7 +58,9 @@ def test_agrees_with_a_bracketed_root_finder():
     x = 0.3
     for k in range(20):
         y = float(curve(x))
-        x = brentq(lambda s, x=x, y=y: (s - x) ** 2 + (float(curve(s)) - y) ** 2 - 0.49, x, x + 0.7 * (1 + 1e-12), xtol=1e-14)
+        x = brentq(
+            lambda s, x=x, y=y: (s - x) ** 2 + (float(curve(s)) - y) ** 2 - 0.49, x, x + 0.7 * (1 + 1e-12), xtol=1e-14
+        )
         assert points[k + 1, 0] == pytest.approx(x, abs=1e-11)
 
 
@@ -95,8 +103,11 @@ def test_longer_and_shorter_links_than_exact():
 
 
 @settings(max_examples=10, deadline=None)
-@given(ratios=st.lists(st.floats(0.7, 1.4), min_size=14, max_size=30), modules=st.sampled_from([2, 4]),
-       omega=st.floats(0.8, 1.3))
+@given(
+    ratios=st.lists(st.floats(0.7, 1.4), min_size=14, max_size=30),
+    modules=st.sampled_from([2, 4]),
+    omega=st.floats(0.8, 1.3),
+)
 def test_exact_scale_of_unequal_links(ratios, modules, omega):
     scale = bp.exact_link_length(ratios, modules, omega)
     curve = ConcertinaCurve([0.0] * modules, 0.0, omega=omega)
@@ -117,11 +128,20 @@ def test_no_exact_length_is_a_status():
             x.raise_if_failed()
 
 
-@pytest.mark.parametrize("arguments", [
-    {"link_length": 0.0, "links": 3}, {"link_length": -1.0, "links": 3}, {"link_length": 1.0}, {"link_length": 1.0, "links": 0},
-    {"link_length": [1.0, 2.0], "links": 3}, {"link_length": [1.0, np.nan]}, {"link_length": [[1.0]]},
-    {"link_length": 1.0, "links": 3, "start": -0.1}, {"link_length": []},
-])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"link_length": 0.0, "links": 3},
+        {"link_length": -1.0, "links": 3},
+        {"link_length": 1.0},
+        {"link_length": 1.0, "links": 0},
+        {"link_length": [1.0, 2.0], "links": 3},
+        {"link_length": [1.0, np.nan]},
+        {"link_length": [[1.0]]},
+        {"link_length": 1.0, "links": 3, "start": -0.1},
+        {"link_length": []},
+    ],
+)
 def test_refuses(arguments):
     with pytest.raises(bp.InputError):
         bp.links_on_curve(ConcertinaCurve([0.1, 0.1], 0.1), **arguments)

@@ -37,9 +37,7 @@ def mixed_robot() -> Robot:
         Contact("keel", "base", "capsule", 0.02, start=(0.0, 0.0, -0.1), end=(0.1, 0.02, -0.13)),
     ]
     tail = [Arc(0.3, Joint("nod"), Joint("wag", scale=0.5), body=Body(mass=0.4))]
-    return Robot.from_rows(
-        {"arm": rows, "tail": tail}, contacts=contacts, base_body=Body(mass=2.0), name="mixed"
-    )
+    return Robot.from_rows({"arm": rows, "tail": tail}, contacts=contacts, base_body=Body(mass=2.0), name="mixed")
 
 
 def differing(one: Any, two: Any) -> list[str]:

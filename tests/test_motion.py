@@ -10,7 +10,12 @@ import bodyplan as bp
 
 @pytest.fixture(scope="module")
 def motion():
-    return bp.plan(bp.snake(12, 0.05), bp.Concertina(body_modules=2, contraction="mirror"), bp.Corridor(0.3), bp.times(0, 10, dt=0.1))
+    return bp.plan(
+        bp.snake(12, 0.05),
+        bp.Concertina(body_modules=2, contraction="mirror"),
+        bp.Corridor(0.3),
+        bp.times(0, 10, dt=0.1),
+    )
 
 
 def test_times_are_even_and_include_both_ends():
@@ -34,10 +39,18 @@ def test_arrays_are_read_only_and_named(motion):
         motion.q = motion.q
 
 
-@pytest.mark.parametrize("changes", [
-    {"t": [0.0]}, {"q": np.zeros((3, 3))}, {"qd": None}, {"base": np.zeros((101, 7))}, {"residual": np.full(101, np.nan)},
-    {"status": ["ok"]}, {"torques": np.zeros((101, 3))},
-])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"t": [0.0]},
+        {"q": np.zeros((3, 3))},
+        {"qd": None},
+        {"base": np.zeros((101, 7))},
+        {"residual": np.full(101, np.nan)},
+        {"status": ["ok"]},
+        {"torques": np.zeros((101, 3))},
+    ],
+)
 def test_refuses_fields_that_do_not_fit(motion, changes):
     with pytest.raises(bp.InputError, match="Motion"):
         motion.replace(**changes)
@@ -91,6 +104,6 @@ def test_failed_samples_raise_on_request(motion):
     status[4] = "out_of_reach"
     spoiled = motion.replace(status=status)
     assert motion.ok and motion.raise_if_failed() is motion and not spoiled.ok
-    with pytest.raises(bp.SolveError, match="out_of_reach.*0.4 s") as caught:
+    with pytest.raises(bp.SolveError, match=r"out_of_reach.*0\.4 s") as caught:
         spoiled.raise_if_failed()
     assert caught.value.status == "out_of_reach" and caught.value.index == 4

@@ -28,7 +28,9 @@ def test_columns_and_functions():
     assert five_point(np.exp, 1e-2)(0.3) == pytest.approx(np.exp(0.3), rel=1e-9)
 
 
-@pytest.mark.parametrize("f,h", [(np.zeros(4), 0.1), (np.zeros(9), 0.0), (np.zeros(9), -1.0), (3.0, 0.1), ([1, 2, np.nan, 4, 5], 1)])
+@pytest.mark.parametrize(
+    "f,h", [(np.zeros(4), 0.1), (np.zeros(9), 0.0), (np.zeros(9), -1.0), (3.0, 0.1), ([1, 2, np.nan, 4, 5], 1)]
+)
 def test_refuses(f, h):
     with pytest.raises(bp.InputError):
         five_point(f, h)

@@ -40,9 +40,7 @@ def random_robot(seed: int) -> Robot:
                 values[field] = driven if rng.random() < 0.5 else float(rng.normal())
             if rng.random() < 0.3:
                 values["theta"] = Joint(f"shared{c}", float(rng.normal()), float(rng.uniform(0.2, 1.5)))
-            rows.append(
-                Row(**values, body=Body(mass=float(rng.uniform(0.1, 2))) if rng.random() < 0.6 else None)
-            )
+            rows.append(Row(**values, body=Body(mass=float(rng.uniform(0.1, 2))) if rng.random() < 0.6 else None))
         chains[f"c{c}"] = rows
     parents = {"c1": "c0.1"} if "c1" in chains else None
     return Robot.from_rows(chains, parents=parents, contacts=BELLY, base_body=Body(mass=2.0))
@@ -74,9 +72,7 @@ def test_sites_and_their_jacobians_are_those_of_the_robot(seed: int) -> None:
     for frame in robot.frames:
         site = data.site(frame)
         np.testing.assert_allclose(site.xpos, poses[frame][:3], atol=2e-13)
-        np.testing.assert_allclose(
-            site.xmat.reshape(3, 3), matrix_from_quaternion(poses[frame][3:]), atol=2e-13
-        )
+        np.testing.assert_allclose(site.xmat.reshape(3, 3), matrix_from_quaternion(poses[frame][3:]), atol=2e-13)
         linear, angular = np.zeros((3, physics.model.nv)), np.zeros((3, physics.model.nv))
         mujoco.mj_jacSite(physics.model, data, linear, angular, site.id)
         mine = np.zeros((6, robot.n))

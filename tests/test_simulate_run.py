@@ -127,9 +127,7 @@ def test_work_is_the_change_of_energy() -> None:
     net = 2.0 * trial.positive_work - trial.absolute_work
     assert net == pytest.approx(G * risen, rel=0.01)
     assert trial.torque[start, 0] == pytest.approx(0.5 * G, rel=1e-3)
-    assert (
-        trial.torque_peak is not None and trial.torque_peak[0] >= np.abs(trial.torque[start:]).max() - 1e-12
-    )
+    assert trial.torque_peak is not None and trial.torque_peak[0] >= np.abs(trial.torque[start:]).max() - 1e-12
 
 
 def test_a_servo_at_its_effort_is_a_warning() -> None:
@@ -152,9 +150,7 @@ def test_divergence_is_a_status_and_nothing_is_nan() -> None:
     for name in ("t", "base", "q", "torque", "com"):
         assert np.isfinite(getattr(trial, name)).all()
     metrics = json.loads(json.dumps(trial.metrics(), allow_nan=False))
-    assert (
-        metrics["speed_m_s"] is None and metrics["peak_force_N"] is None and metrics["advance_ratio"] is None
-    )
+    assert metrics["speed_m_s"] is None and metrics["peak_force_N"] is None and metrics["advance_ratio"] is None
     with pytest.raises(SolveError, match="diverged"):
         trial.raise_if_failed()
 
@@ -170,9 +166,7 @@ def wriggle(squeeze: float | None = None, cycles: float = 1.2) -> Motion:
     base[:, 0], base[:, 2] = 0.05 * t, 0.02
     base[:, 3:] = quaternion_exp(np.array([0.0, 0.0, -0.5]) * fold)
     width = 0.1 * np.sin(0.3) + 0.04
-    ground: Ground = (
-        Plane() if squeeze is None else Corridor(width - squeeze, friction=0.1, wall_friction=0.8)
-    )
+    ground: Ground = Plane() if squeeze is None else Corridor(width - squeeze, friction=0.1, wall_friction=0.8)
     claims = [
         Claim("periodic", "cycle", {"period": 1.0, "advance": [0.05, 0.0, 0.0], "turn": 0.0}),
         Claim("at_rest", "tail", {"frames": ["base"], "start": 0.25, "end": 0.75, "stage": "fold"}),
@@ -231,12 +225,8 @@ def test_two_axes_that_share_a_joint_stay_in_step() -> None:
     feet = [Contact(f, f, "sphere", 0.02) for f in ("base", "f1", "f2")]
     robot = Robot.from_rows({"c": rows}, contacts=feet, base_body=Body(mass=0.5))
     t = times(0.0, 1.0, 0.02)
-    trial = simulate(
-        motion_of(robot, Plane(), 0.6 * np.sin(3.0 * t), t), settle=0.1, ramp=0.0, servo=(20.0, 0.4)
-    )
-    assert (
-        trial.ok and trial.warnings == () and trial.tracking_max is not None and trial.tracking_max[0] < 0.1
-    )
+    trial = simulate(motion_of(robot, Plane(), 0.6 * np.sin(3.0 * t), t), settle=0.1, ramp=0.0, servo=(20.0, 0.4))
+    assert trial.ok and trial.warnings == () and trial.tracking_max is not None and trial.tracking_max[0] < 0.1
 
 
 # --- the reference and the measures, without physics ---

@@ -86,7 +86,7 @@ _FACE = {
 }
 _MODULES = ("curves", "errors", "export", "fitting", "gaits", "ground", "rates", "robot", "spatial", "units")
 
-__all__ = [*sorted(_FACE), "curves", "export", "fitting", "gaits", "ground", "rates", "spatial"]  # noqa: PLE0604
+__all__ = [*sorted(_FACE), "curves", "export", "fitting", "gaits", "ground", "rates", "spatial"]
 
 
 class _Face(ModuleType):

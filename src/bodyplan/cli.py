@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,7 +25,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-MissionArgument = Annotated[str, typer.Argument(help="A ready mission's name (see: bodyplan missions) or a .toml file.")]
+MissionArgument = Annotated[
+    str, typer.Argument(help="A ready mission's name (see: bodyplan missions) or a .toml file.")
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a field, for example gait.omega=1.1. May be repeated."),
@@ -65,14 +66,17 @@ def run(
         from bodyplan import job
 
         with _progress() as progress:
-            result = job.run(mission, out, overrides=set_ or (), force=force, simulate=simulate, compare=compare,
-                             progress=progress)
+            result = job.run(
+                mission, out, overrides=set_ or (), force=force, simulate=simulate, compare=compare, progress=progress
+            )
         _summary(result)
     raise typer.Exit(0 if result.ok else 1)
 
 
 @app.command()
-def check(mission: Annotated[str, typer.Argument(help="A mission, or a motion saved as .npz.")], set_: SetOption = None) -> None:
+def check(
+    mission: Annotated[str, typer.Argument(help="A mission, or a motion saved as .npz.")], set_: SetOption = None
+) -> None:
     """Plan a mission (or load a motion) and let the judge test it."""
     with _bad_input():
         from bodyplan.check import check as judge
@@ -207,7 +211,12 @@ def _progress() -> Iterator[Any]:
 
         yield say
         return
-    columns = TextColumn("{task.description:12}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn()
+    columns = (
+        TextColumn("{task.description:12}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=1.0)
 
@@ -234,8 +243,10 @@ def _print_checks(report: Any) -> None:
         colour = {True: None, False: typer.colors.RED, None: typer.colors.YELLOW}[line.passed]
         typer.secho(str(line), fg=colour)
     failed = len(report.failures)
-    typer.secho(f"{failed} of {len(report.lines)} checks failed" if failed else f"all {len(report.lines)} checks passed",
-                bold=True)
+    typer.secho(
+        f"{failed} of {len(report.lines)} checks failed" if failed else f"all {len(report.lines)} checks passed",
+        bold=True,
+    )
 
 
 def _figure(value: float | None, unit: str, scale: float = 1.0, digits: int = 3) -> str:
@@ -252,24 +263,32 @@ def _summary(result: Result) -> None:
     failed = len(report.failures)
     typer.echo(f"  checks     {len(report.lines) - failed} passed, {failed} failed")
     if "period" in plan and "advance_per_cycle" in plan:
-        typer.echo(f"  plan       {_figure(plan['advance_per_cycle'], 'mm', 1e3, 4)} a cycle of "
-                   f"{_figure(plan['period'], 's')}, {_figure(plan['speed'], 'mm/s', 1e3)}")
+        typer.echo(
+            f"  plan       {_figure(plan['advance_per_cycle'], 'mm', 1e3, 4)} a cycle of "
+            f"{_figure(plan['period'], 's')}, {_figure(plan['speed'], 'mm/s', 1e3)}"
+        )
     if trial is not None:
         row = outcome.itself
         if trial.ok:
             ratio = "no advance planned" if row.ratio is None else f"{row.ratio:.1%} of the planned advance"
-            typer.echo(f"  physics    {ratio}, {_figure(row.speed, 'mm/s', 1e3)}, "
-                       f"peak torque {_figure(row.peak_torque, 'N m')}, "
-                       f"cost of transport {_figure(row.cost_of_transport, '')}")
+            typer.echo(
+                f"  physics    {ratio}, {_figure(row.speed, 'mm/s', 1e3)}, "
+                f"peak torque {_figure(row.peak_torque, 'N m')}, "
+                f"cost of transport {_figure(row.cost_of_transport, '')}"
+            )
         else:
             typer.secho(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
         for warning in trial.warnings[:5]:
             typer.echo(f"  warning    {warning}")
     if outcome.others:
         typer.echo("")
-        _table(["mission", "executed / planned", "speed"],
-               [[o.name, "-" if o.ratio is None else f"{o.ratio:.2f}", _figure(o.speed, "mm/s", 1e3)]
-                for o in (outcome.itself, *outcome.others)])
+        _table(
+            ["mission", "executed / planned", "speed"],
+            [
+                [o.name, "-" if o.ratio is None else f"{o.ratio:.2f}", _figure(o.speed, "mm/s", 1e3)]
+                for o in (outcome.itself, *outcome.others)
+            ],
+        )
     typer.echo(f"\n  report     {result.report}")
 
 
@@ -280,4 +299,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

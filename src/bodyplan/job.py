@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.check import Report, check
+from bodyplan.check import check
 from bodyplan.errors import InputError
 from bodyplan.metrics import Metrics, metrics_of
 from bodyplan.missions import Mission, load_mission
@@ -38,13 +38,13 @@ def mission_times(mission: Mission) -> Array:
     time = mission.time
     if period is None:
         if time.stop is None:
-            raise InputError("time.stop: this gait has no cycle; say how long, for example stop = \"10 s\".")
+            raise InputError('time.stop: this gait has no cycle; say how long, for example stop = "10 s".')
         steps = max(1, int(np.ceil(time.stop / time.dt)))
         return np.linspace(0.0, time.stop, steps + 1)
     stop = time.stop if time.stop is not None else (2.0 if time.cycles is None else time.cycles) * period
     a_cycle = max(4, int(np.ceil(period / time.dt - 1e-9)))
     step = period / a_cycle
-    return np.arange(int(np.floor(stop / step + 1e-9)) + 1) * step
+    return np.asarray(np.arange(int(np.floor(stop / step + 1e-9)) + 1) * step, dtype=np.float64)
 
 
 def plan_mission(mission: Mission) -> Motion:
@@ -64,8 +64,16 @@ def simulate_mission(mission: Mission, motion: Motion, progress: Callable[[float
     friction: Any = settings.friction
     if friction is not None and not isinstance(friction, float):
         friction = Friction(friction.forward, friction.backward, friction.sideways)
-    return simulate(motion, cycles=settings.cycles, friction=friction, servo=settings.servo, dt=settings.dt,
-                    settle=settings.settle, ramp=settings.ramp, progress=progress)
+    return simulate(
+        motion,
+        cycles=settings.cycles,
+        friction=friction,
+        servo=settings.servo,
+        dt=settings.dt,
+        settle=settings.settle,
+        ramp=settings.ramp,
+        progress=progress,
+    )
 
 
 def compare_mission(name: str) -> Comparison:
@@ -114,8 +122,18 @@ def work(mission: Mission, *, simulate: bool = True, compare: bool = True, progr
         else:
             trial = simulate_mission(mission, motion, lambda part: progress("simulating", part))
             others = [compare_mission(name) for name in names]
-    return Outcome(mission.name, mission.title, mission.about.strip(), mission.text, mission.overrides, motion, report,
-                   trial, tuple(others), variants)
+    return Outcome(
+        mission.name,
+        mission.title,
+        mission.about.strip(),
+        mission.text,
+        mission.overrides,
+        motion,
+        report,
+        trial,
+        tuple(others),
+        variants,
+    )
 
 
 def run(

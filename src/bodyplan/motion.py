@@ -90,7 +90,12 @@ class Motion:
             raise InputError("Motion.t: needs at least two times, strictly increasing.")
         size, n = len(t), self.robot.n
         shapes: dict[str, tuple[int, ...]] = {
-            "t": (size,), "base": (size, 7), "q": (size, n), "qd": (size, n), "qdd": (size, n), "residual": (size,),
+            "t": (size,),
+            "base": (size, 7),
+            "q": (size, n),
+            "qd": (size, n),
+            "qdd": (size, n),
+            "residual": (size,),
         }
         c = len(self.robot.contacts)
         for name, optional_shape in (("contacts", (size, c)), ("forces", (size, c, 3)), ("torques", (size, n))):

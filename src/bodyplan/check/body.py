@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, IntArray
 from bodyplan.check.claims import allowance
 from bodyplan.check.report import Line
 from bodyplan.errors import Status
@@ -52,8 +52,9 @@ def rates_agree(motion: Motion) -> Line:
     passed = value <= slack
     by_joint = (h * beyond).sum(axis=0)
     detail = "" if passed or not by_joint.size else f"most at joint {motion.joints[int(by_joint.argmax())]}"
-    return Line("rates agree with positions, share of the travel that does not", value, slack, "", passed, detail,
-                kind="rates")
+    return Line(
+        "rates agree with positions, share of the travel that does not", value, slack, "", passed, detail, kind="rates"
+    )
 
 
 def joint_limits(motion: Motion) -> list[Line]:
@@ -64,15 +65,34 @@ def joint_limits(motion: Motion) -> list[Line]:
         room = np.minimum(motion.q - limits[:, 0], limits[:, 1] - motion.q)
         at = np.unravel_index(int(room.argmin()), room.shape)
         value = float(room[at])
-        lines.append(Line("joint limits", value, 0.0, "rad", value >= -EXACT,
-                          f"closest: {motion.joints[at[1]]} at {motion.t[at[0]]:.4g} s", at_least=True, kind="limits"))
+        lines.append(
+            Line(
+                "joint limits",
+                value,
+                0.0,
+                "rad",
+                value >= -EXACT,
+                f"closest: {motion.joints[at[1]]} at {motion.t[at[0]]:.4g} s",
+                at_least=True,
+                kind="limits",
+            )
+        )
     rates = motion.robot.rates
     if np.isfinite(rates).any():
         share = np.abs(motion.qd) / rates
         at = np.unravel_index(int(share.argmax()), share.shape)
         value = float(share[at])
-        lines.append(Line("joint rates, share of the limit", value, 1.0, "", value <= 1.0 + EXACT,
-                          f"fastest: {motion.joints[at[1]]} at {motion.t[at[0]]:.4g} s", kind="limits"))
+        lines.append(
+            Line(
+                "joint rates, share of the limit",
+                value,
+                1.0,
+                "",
+                value <= 1.0 + EXACT,
+                f"fastest: {motion.joints[at[1]]} at {motion.t[at[0]]:.4g} s",
+                kind="limits",
+            )
+        )
     return lines
 
 
@@ -129,7 +149,7 @@ def segment_distance(p: Array, q: Array) -> Array:
         x = ((point - seg[..., 0, :]) * along).sum(-1) / np.where(square > 0, square, 1.0)
         off = point - seg[..., 0, :] - np.clip(x, 0.0, 1.0)[..., None] * along
         best = np.minimum(best, (off * off).sum(-1))
-    return np.sqrt(np.asarray(best))
+    return np.asarray(np.sqrt(best))
 
 
 def self_clearance(motion: Motion) -> Line | None:
@@ -147,17 +167,28 @@ def self_clearance(motion: Motion) -> Line | None:
         if gap[at] < best:
             best, when, pair = float(gap[at]), k + int(at[0]), apart[at[1]]
     names = [motion.robot.contacts[which[i]].name for i in pair]
-    return Line("links clear of each other", best, 0.0, "m", best >= -EXACT,
-                f"closest: {names[0]} and {names[1]} at {motion.t[when]:.4g} s", at_least=True, kind="self")
+    return Line(
+        "links clear of each other",
+        best,
+        0.0,
+        "m",
+        best >= -EXACT,
+        f"closest: {names[0]} and {names[1]} at {motion.t[when]:.4g} s",
+        at_least=True,
+        kind="self",
+    )
 
 
-def _separate_pairs(motion: Motion, which: list[int]) -> Array:
+def _separate_pairs(motion: Motion, which: list[int]) -> IntArray:
     """Pairs of shapes with at least one whole link between them."""
     robot = motion.robot
     place: dict[str, tuple[str, int]] = {}
     for chain in robot.chains:
-        carrying = [chain.frame_name(i) for i in range(len(chain.elements))
-                    if any(c.frame == chain.frame_name(i) for c in robot.contacts)]
+        carrying = [
+            chain.frame_name(i)
+            for i in range(len(chain.elements))
+            if any(c.frame == chain.frame_name(i) for c in robot.contacts)
+        ]
         place.update({name: (chain.name, i) for i, name in enumerate(carrying)})
     pairs = []
     for a in range(len(which)):
@@ -187,9 +218,18 @@ def ground_clearance(motion: Motion) -> list[Line]:
         line = _worst_gap(motion, which, gap, f"presses on the {presses['role']} no deeper than planned", depth + EXACT)
         deepest = float(radii.min())
         shallow = depth < deepest
-        lines.append(Line(line.what, line.value, -depth, "m", bool(line.passed and shallow),
-                          line.detail if shallow else f"deeper than the radius of the body, {deepest:.3g} m",
-                          at_least=True, kind="presses"))
+        lines.append(
+            Line(
+                line.what,
+                line.value,
+                -depth,
+                "m",
+                bool(line.passed and shallow),
+                line.detail if shallow else f"deeper than the radius of the body, {deepest:.3g} m",
+                at_least=True,
+                kind="presses",
+            )
+        )
     elif np.any(np.abs(gap - above) > EXACT):
         lines.append(_worst_gap(motion, which, gap, "clear of walls and ceiling", EXACT))
     return lines
@@ -199,5 +239,13 @@ def _worst_gap(motion: Motion, which: list[int], gap: Array, what: str, allowed:
     at = np.unravel_index(int(gap.argmin()), gap.shape)
     value = float(gap[at])
     name = motion.robot.contacts[which[int(at[1])]].name
-    return Line(what, value, 0.0, "m", value >= -allowed, f"closest: {name} at {motion.t[at[0]]:.4g} s", at_least=True,
-                kind="ground")
+    return Line(
+        what,
+        value,
+        0.0,
+        "m",
+        value >= -allowed,
+        f"closest: {name} at {motion.t[at[0]]:.4g} s",
+        at_least=True,
+        kind="ground",
+    )

@@ -39,8 +39,15 @@ def at_rest(motion: Motion, positions: Array, claim: Claim) -> Line:
         start, end = start + every, end + every
     limit = float(data["tolerance"])
     detail = f"{data['stage']}, {len(frames)} joints" + (f", at {when:.3g} s" if worst > 0.0 else "")
-    return Line(claim.label, worst if seen else None, limit, "m", worst <= limit if seen else None,
-                detail if seen else "no two samples fall into it", kind=claim.kind)
+    return Line(
+        claim.label,
+        worst if seen else None,
+        limit,
+        "m",
+        worst <= limit if seen else None,
+        detail if seen else "no two samples fall into it",
+        kind=claim.kind,
+    )
 
 
 def on_curve(motion: Motion, positions: Array, claim: Claim) -> Line:
@@ -59,9 +66,15 @@ def on_curve(motion: Motion, positions: Array, claim: Claim) -> Line:
     worst = np.unravel_index(int(off.argmax()), off.shape)
     limit = float(data["tolerance"])
     value = float(off[worst])
-    return Line(claim.label, value, limit, "m", value <= limit,
-                f"{len(samples)} samples; worst at {motion.t[samples[worst[0]]]:.3g} s, joint {worst[1]}",
-                kind=claim.kind)
+    return Line(
+        claim.label,
+        value,
+        limit,
+        "m",
+        value <= limit,
+        f"{len(samples)} samples; worst at {motion.t[samples[worst[0]]]:.3g} s, joint {worst[1]}",
+        kind=claim.kind,
+    )
 
 
 def periodic(motion: Motion, positions: Array, claim: Claim) -> Line:
@@ -71,22 +84,45 @@ def periodic(motion: Motion, positions: Array, claim: Claim) -> Line:
     later = motion.t + period
     inside = later <= motion.t[-1] + SAME_TIME
     if not inside.any():
-        return Line(claim.label, None, None, "", None, f"the motion is shorter than one cycle of {period:.4g} s",
-                    kind=claim.kind)
-    nearest = np.abs(motion.t[None, :] - later[inside][:, None]).argmin(axis=1) if len(motion.t) < 3000 else np.clip(
-        np.searchsorted(motion.t, later[inside] - SAME_TIME), 0, len(motion.t) - 1)
+        return Line(
+            claim.label,
+            None,
+            None,
+            "",
+            None,
+            f"the motion is shorter than one cycle of {period:.4g} s",
+            kind=claim.kind,
+        )
+    nearest = (
+        np.abs(motion.t[None, :] - later[inside][:, None]).argmin(axis=1)
+        if len(motion.t) < 3000
+        else np.clip(np.searchsorted(motion.t, later[inside] - SAME_TIME), 0, len(motion.t) - 1)
+    )
     exact = np.abs(motion.t[nearest] - later[inside]) <= SAME_TIME
     if not exact.any():
-        return Line(claim.label, None, None, "", None,
-                    f"no two samples are one cycle ({period:.6g} s) apart: choose dt so that it divides the cycle",
-                    kind=claim.kind)
+        return Line(
+            claim.label,
+            None,
+            None,
+            "",
+            None,
+            f"no two samples are one cycle ({period:.6g} s) apart: choose dt so that it divides the cycle",
+            kind=claim.kind,
+        )
     first, second = np.flatnonzero(inside)[exact], nearest[exact]
     joints = float(np.abs(motion.q[second] - motion.q[first]).max(initial=0.0))
     moved = motion.base[second, :3] - motion.base[first, :3] - np.asarray(data["advance"])
     value = max(joints, float(np.abs(moved).max()))
     limit = float(data["tolerance"])
-    return Line(claim.label, value, limit, "rad, m", value <= limit,
-                f"{len(first)} pairs of samples one cycle of {period:.4g} s apart", kind=claim.kind)
+    return Line(
+        claim.label,
+        value,
+        limit,
+        "rad, m",
+        value <= limit,
+        f"{len(first)} pairs of samples one cycle of {period:.4g} s apart",
+        kind=claim.kind,
+    )
 
 
 TESTS: dict[str, Callable[[Motion, Array, Claim], Line]] = {

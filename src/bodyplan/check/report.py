@@ -33,8 +33,16 @@ class Line:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON types."""
-        return {"what": self.what, "value": self.value, "limit": self.limit, "unit": self.unit,
-                "at_least": self.at_least, "passed": self.passed, "detail": self.detail, "kind": self.kind}
+        return {
+            "what": self.what,
+            "value": self.value,
+            "limit": self.limit,
+            "unit": self.unit,
+            "at_least": self.at_least,
+            "passed": self.passed,
+            "detail": self.detail,
+            "kind": self.kind,
+        }
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from bodyplan.errors import InputError, UnknownNameError
 
 #: Gauss-Legendre rule on [0, 1]
 GAUSS_NODES, GAUSS_WEIGHTS = (
-    frozen(values) for values in ((np.polynomial.legendre.leggauss(12)[0] + 1) / 2,
-                                  np.polynomial.legendre.leggauss(12)[1] / 2)
+    frozen(values)
+    for values in ((np.polynomial.legendre.leggauss(12)[0] + 1) / 2, np.polynomial.legendre.leggauss(12)[1] / 2)
 )
 
 

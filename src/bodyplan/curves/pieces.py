@@ -11,7 +11,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from numba import njit
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, IntArray
 from bodyplan.curves.dynamic import crossing_of, dynamic_jet, dynamic_value
 
 START, KIND, ORIGIN, V, VD, VDD, G, GD, GDD = range(9)
@@ -22,9 +22,7 @@ RULES = {"cut": CUT, "product": PRODUCT, "natural": NATURAL}
 
 
 @njit(cache=True)
-def build_pieces(
-    tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array
-) -> int:
+def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array) -> int:
     """Fill ``out`` (>= N_B + 4, COLUMNS) for one curve; returns the number of pieces (kernel).
 
     A straight line of length ``lead`` (>= 0) stands before the tail.
@@ -115,7 +113,7 @@ def piece_value(x: float, piece: Array, omega: float) -> tuple[float, float, flo
 
 
 @njit(cache=True)
-def evaluate(x: Array, pieces: Array, counts: Array, omega: float, y: Array, slope: Array) -> None:
+def evaluate(x: Array, pieces: Array, counts: IntArray, omega: float, y: Array, slope: Array) -> None:
     """y and slope (B, S) of B curves at x (B, S) (kernel)."""
     for b in range(x.shape[0]):
         for i in range(x.shape[1]):
@@ -125,7 +123,7 @@ def evaluate(x: Array, pieces: Array, counts: Array, omega: float, y: Array, slo
 
 @njit(cache=True)
 def build_batch(
-    tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array, counts: Array
+    tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array, counts: IntArray
 ) -> None:
     """:func:`build_pieces` for B curves without rates: tail (B,), gammas (B, N_B + 1) (kernel)."""
     t = np.zeros(3)

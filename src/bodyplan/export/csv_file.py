@@ -26,7 +26,7 @@ def write(motion: Motion, path: str | os.PathLike[str]) -> None:
     """Write ``motion`` to ``path``; numbers are written so that they read back equal."""
     table = np.column_stack([motion.t, motion.base, motion.q, motion.qd, motion.qdd])
     with replacing(path) as file:
-        writer = csv.writer(file, lineterminator="\n")  # type: ignore[arg-type]
+        writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns(motion))
         for row, status in zip(table.tolist(), motion.status, strict=True):
             writer.writerow([*map(repr, row), status])

@@ -54,7 +54,7 @@ def write(
     missing folder.
     """
     with replacing(path) as file:
-        file.write(text(motion_or_robot, ground, **options))  # type: ignore[call-overload]
+        file.write(text(motion_or_robot, ground, **options))
 
 
 def text(motion_or_robot: Motion | Robot, ground: Ground | None = None, **options: Any) -> str:

@@ -32,8 +32,10 @@ def write(motion: Motion, path: str | os.PathLike[str]) -> None:
         "robot": motion.robot.to_dict(),
         "ground": motion.ground.to_dict(),
         "gait": dict(motion.gait),
-        "claims": [{"kind": c.kind, "label": c.label, "data": _pack(c.data, f"claim{i}", arrays)}
-                   for i, c in enumerate(motion.claims)],
+        "claims": [
+            {"kind": c.kind, "label": c.label, "data": _pack(c.data, f"claim{i}", arrays)}
+            for i, c in enumerate(motion.claims)
+        ],
         "facts": dict(motion.facts),
         "stages": motion.stages,
         "notes": motion.notes,

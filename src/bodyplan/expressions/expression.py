@@ -81,9 +81,7 @@ class Expression:
         points = self._points(arrays)
         jet, culprit = self._run(points, len(self._variables))
         value, gradient, hessian = jet
-        good = (
-            np.isfinite(value) & np.isfinite(gradient).all(axis=-1) & np.isfinite(hessian).all(axis=(-2, -1))
-        )
+        good = np.isfinite(value) & np.isfinite(gradient).all(axis=-1) & np.isfinite(hessian).all(axis=(-2, -1))
         self._check(points, good, culprit)
         return jet
 
@@ -162,13 +160,9 @@ class Expression:
         if good.all():
             return
         index = tuple(np.argwhere(~good)[0])
-        at = ", ".join(
-            f"{name} = {float(p[index])!r}" for name, p in zip(self._variables, points, strict=True)
-        )
+        at = ", ".join(f"{name} = {float(p[index])!r}" for name, p in zip(self._variables, points, strict=True))
         part = f" (because of {shown(culprit)})" if culprit else ""
-        raise InputError(
-            f"Expression {shown(self._text)}: not finite, or without derivatives, at {at}{part}."
-        )
+        raise InputError(f"Expression {shown(self._text)}: not finite, or without derivatives, at {at}{part}.")
 
 
 def _seeds(variables: Sequence[Any], n: int) -> list[Jet]:
@@ -177,9 +171,7 @@ def _seeds(variables: Sequence[Any], n: int) -> list[Jet]:
     return [Jet(v, tuple(1.0 if i == j else None for j in range(n)), curved) for i, v in enumerate(variables)]
 
 
-def _dense(
-    jet: Jet, shape: tuple[int, ...], n: int, part: Callable[[Any], Any]
-) -> tuple[Array, Array, Array]:
+def _dense(jet: Jet, shape: tuple[int, ...], n: int, part: Callable[[Any], Any]) -> tuple[Array, Array, Array]:
     """The arrays of a jet; ``part`` maps a number of its kind to an array."""
     value, gradient, hessian = np.empty(shape), np.zeros((*shape, n)), np.zeros((*shape, n, n))
     value[...] = part(jet.value)

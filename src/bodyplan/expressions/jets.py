@@ -155,9 +155,7 @@ def _apply(node: Node, args: list[Jet], math: Any) -> Jet:
             f, p = math.power(a.value, node.number), node.number
             if not a.gradient:
                 return Jet(f)
-            return _chain(
-                a, f, p * math.power(a.value, p - 1.0), p * (p - 1.0) * math.power(a.value, p - 2.0), math
-            )
+            return _chain(a, f, p * math.power(a.value, p - 1.0), p * (p - 1.0) * math.power(a.value, p - 2.0), math)
         case "min":
             return _select(math.order(args[1].value, a.value), a, args[1], math)
         case "max":
@@ -181,11 +179,7 @@ def _chain(u: Jet, f: Number, f1: Number, f2: Number | None, math: Any) -> Jet:
 def _product(a: Jet, b: Jet, math: Any) -> Jet:
     """(a b)_ij = a b_ij + b a_ij + a_i b_j + a_j b_i."""
     if a is b:
-        return (
-            _chain(a, math.square(a.value), 2.0 * a.value, 2.0, math)
-            if a.gradient
-            else Jet(math.square(a.value))
-        )
+        return _chain(a, math.square(a.value), 2.0 * a.value, 2.0, math) if a.gradient else Jet(math.square(a.value))
     u, v, g, h = a.value, b.value, a.gradient, b.gradient
     first = tuple(_add(_mul(u, hi), _mul(v, gi)) for gi, hi in zip(g, h, strict=True))
     second = tuple(

@@ -60,8 +60,7 @@ def parse(text: str, variables: tuple[str, ...], fold: Fold) -> tuple[Node, ...]
     strange = next((c for c in text if not c.isascii() or not c.isprintable() or c in "#\\"), None)
     if strange is not None:
         raise InputError(
-            f"Expression {shown(text)}: the character {strange!r} is not allowed; "
-            f"write {_allowed(variables)}."
+            f"Expression {shown(text)}: the character {strange!r} is not allowed; write {_allowed(variables)}."
         )
     try:
         with warnings.catch_warnings():
@@ -69,13 +68,9 @@ def parse(text: str, variables: tuple[str, ...], fold: Fold) -> tuple[Node, ...]
             tree = ast.parse(text, mode="eval")
     except SyntaxError as error:
         at = f" at column {error.offset} ({text[max(0, error.offset - 1) :][:20]!r})" if error.offset else ""
-        raise InputError(
-            f"Expression {shown(text)}: cannot be read{at}; write {_allowed(variables)}."
-        ) from error
+        raise InputError(f"Expression {shown(text)}: cannot be read{at}; write {_allowed(variables)}.") from error
     except (ValueError, MemoryError, RecursionError) as error:
-        raise InputError(
-            f"Expression {shown(text)}: too deeply nested, at most {MAX_DEPTH} levels."
-        ) from error
+        raise InputError(f"Expression {shown(text)}: too deeply nested, at most {MAX_DEPTH} levels.") from error
     builder = _Builder(text, variables, fold)
     last = builder.visit(tree.body, 0)
     return (*builder.nodes[: last + 1],)

@@ -105,7 +105,15 @@ def next_joint(x0: float, y0: float, k: int, length: float, pieces: Array, count
 
 @njit(cache=True)
 def _tight(
-    a: float, b: float, y: float, k: int, length: float, pieces: Array, count: int, omega: float, nodes: Array,
+    a: float,
+    b: float,
+    y: float,
+    k: int,
+    length: float,
+    pieces: Array,
+    count: int,
+    omega: float,
+    nodes: Array,
     weights: Array,
 ) -> bool:
     """True where the arc from x = a to b is longer than TIGHT_ARC links; integrates only where a bound leaves doubt."""
@@ -227,9 +235,7 @@ def links_on_curve(
     size = counts.size
     points, angles = np.empty((size, lengths.size + 1, 2)), np.empty((size, lengths.size))
     tight = np.empty(size, dtype=np.int64)
-    _fit_batch(
-        lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight
-    )
+    _fit_batch(lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight)
     points, angles = points.reshape(*curve.batch, *points.shape[1:]), angles.reshape(*curve.batch, -1)
     status = np.where(tight < 0, Status.OK.value, Status.TOO_TIGHT.value).reshape(curve.batch)
     if not curve.batch:
@@ -252,7 +258,9 @@ class ExactLength(float):
     def raise_if_failed(self) -> ExactLength:
         """This length, or SolveError."""
         if self.status != Status.OK.value:
-            raise SolveError(self.status, "no link length puts the last joint exactly on the end of the contracted curve")
+            raise SolveError(
+                self.status, "no link length puts the last joint exactly on the end of the contracted curve"
+            )
         return self
 
 
@@ -272,12 +280,12 @@ def exact_link_length(
     modules = whole(body_modules, "body_modules", at_least=1)
     number(omega, "omega", above=0.0)
     curve = ConcertinaCurve(np.zeros(modules), 0.0, omega=omega, crossing=crossing)
-    end = curve.flat_from
+    end = float(curve.flat_from)
     if not np.isfinite(end):
         return ExactLength(np.nan, Status.NO_EXACT_LENGTH, end)
 
     def miss(scale: float) -> float:
-        return float(links_on_curve(curve, scale * ratios).points[-1, 0]) - end
+        return float(links_on_curve(curve, scale * ratios).points[-1, 0] - end)
 
     # the chain is longer than its x extent and not longer than the curve
     low, high = end / ratios.sum(), float(curve.arclength(end)) / ratios.sum()

@@ -30,7 +30,7 @@ class Gait(ABC):
         return None
 
     def variants(self) -> dict[str, Gait]:
-        """Gaits worth setting beside this one in the report, by label (this one included); empty where there are none."""
+        """Gaits to set beside this one in the report, by label (this one included); empty where there are none."""
         return {}
 
     @abstractmethod

@@ -55,7 +55,9 @@ class Concertina(Gait):
 
     kind: ClassVar[str] = "concertina"
     UNITS: ClassVar[Mapping[str, str]] = {
-        "stretch_time": "time", "max_joint_rate": "angular_rate", "length_unit": "length"
+        "stretch_time": "time",
+        "max_joint_rate": "angular_rate",
+        "length_unit": "length",
     }
 
     def __init__(
@@ -111,8 +113,22 @@ class Concertina(Gait):
 
     def to_dict(self) -> dict[str, Any]:
         """The options as JSON types, with ``kind``."""
-        names = ("body_modules", "gamma_max", "omega", "stretch_time", "contraction", "extension", "waves", "blend",
-                 "overlap", "rates", "max_joint_rate", "warp", "length_unit", "crossing")
+        names = (
+            "body_modules",
+            "gamma_max",
+            "omega",
+            "stretch_time",
+            "contraction",
+            "extension",
+            "waves",
+            "blend",
+            "overlap",
+            "rates",
+            "max_joint_rate",
+            "warp",
+            "length_unit",
+            "crossing",
+        )
         options = {name: getattr(self, name) for name in names}
         if self.rates is not None:
             options["rates"] = list(self.rates)
@@ -172,8 +188,9 @@ class Concertina(Gait):
             status=status,
             claims=claims_of(body, state, t, tail, made, walls),
             facts=facts,
-            stages=tuple((w.name + (f" (wave {k + 1})" if self.waves > 1 else ""), a, b)
-                         for w, k, a, b in body.cycle.windows()),
+            stages=tuple(
+                (w.name + (f" (wave {k + 1})" if self.waves > 1 else ""), a, b) for w, k, a, b in body.cycle.windows()
+            ),
             notes=notes_of(self, body, walls),
         )
 
@@ -226,16 +243,18 @@ class ConcertinaBody:
         back = StretchingBody(stages, lengths[::-1].copy(), gait.omega, gait.crossing, lead)
         sweep: Sweep
         if gait.contraction == "literal":
-            contraction = StretchingBody(stretching(*plain, literal_contraction=True), lengths, gait.omega,
-                                         gait.crossing)
+            contraction = StretchingBody(
+                stretching(*plain, literal_contraction=True), lengths, gait.omega, gait.crossing
+            )
             sweep = LiteralSweep(front, contraction)
         else:
             extension = gait.extension if gait.contraction == "travelling" else 1.0
             sweep = ExtensionSweep(front, back, extension, sign=1.0 if gait.body_modules % 2 == 0 else -1.0)
         constant_rate = gait.contraction == "travelling" or gait.max_joint_rate is not None
         warp = constant_rate if gait.warp is None else gait.warp
-        cycle = ExtensionCycle(sweep, lengths, gait.waves, 2.0 * gait.stretch_time, gait.max_joint_rate, warp,
-                               gait.blend)
+        cycle = ExtensionCycle(
+            sweep, lengths, gait.waves, 2.0 * gait.stretch_time, gait.max_joint_rate, warp, gait.blend
+        )
         contracted = fit.points[0]
         radius = max((c.radius for c in robot.contacts), default=0.0)
         width = float(np.ptp(contracted[:, 1])) * unit + 2.0 * radius

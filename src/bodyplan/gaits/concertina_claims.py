@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, IntArray
 from bodyplan.gaits.cycle import CycleState
 from bodyplan.gaits.stretching import StretchingBody
 from bodyplan.gaits.sweep import LiteralSweep, Sweep, Window
@@ -47,16 +47,44 @@ def _on_curve(body: ConcertinaBody, state: CycleState, tail: Array, joints: Arra
     out = []
     start = np.column_stack([tail, np.zeros(len(u))])
     launching, landing = np.flatnonzero(u <= sweep.launch_end), np.flatnonzero(u >= sweep.landing_start)
-    out.append(_curve_claim(body, "joints on the stretching curve", body_of(sweep, "front"), launching,
-                            u[launching] + total, start, list(body.snake.frames)))
+    out.append(
+        _curve_claim(
+            body,
+            "joints on the stretching curve",
+            body_of(sweep, "front"),
+            launching,
+            u[launching] + total,
+            start,
+            list(body.snake.frames),
+        )
+    )
     if isinstance(sweep, LiteralSweep):
-        out.append(_curve_claim(body, "joints on the contracting curve", sweep.contraction, landing, u[landing], start,
-                                list(body.snake.frames)))
+        out.append(
+            _curve_claim(
+                body,
+                "joints on the contracting curve",
+                sweep.contraction,
+                landing,
+                u[landing],
+                start,
+                list(body.snake.frames),
+            )
+        )
     else:
         # read from the head: turned round by pi, and for odd N_B also flipped
         head = np.column_stack([joints[:, -1], np.full(len(u), np.pi)])
-        out.append(_curve_claim(body, "joints on the contracting curve", body_of(sweep, "back"), landing,
-                                total - u[landing], head, list(body.snake.frames[::-1]), 1.0 if body.gait.body_modules % 2 == 0 else -1.0))
+        out.append(
+            _curve_claim(
+                body,
+                "joints on the contracting curve",
+                body_of(sweep, "back"),
+                landing,
+                total - u[landing],
+                head,
+                list(body.snake.frames[::-1]),
+                1.0 if body.gait.body_modules % 2 == 0 else -1.0,
+            )
+        )
     return [claim for claim in out if len(claim.data["samples"])]
 
 
@@ -67,24 +95,40 @@ def body_of(sweep: Any, which: str) -> StretchingBody:
 
 
 def _curve_claim(
-    body: ConcertinaBody, label: str, chain: StretchingBody, samples: Array, progress: Array, pose: Array,
-    frames: list[str], flip: float = 1.0,
+    body: ConcertinaBody,
+    label: str,
+    chain: StretchingBody,
+    samples: IntArray,
+    progress: Array,
+    pose: Array,
+    frames: list[str],
+    flip: float = 1.0,
 ) -> Claim:
     p = chain.stages.parameters(np.clip(progress, 0.0, chain.stages.total))
-    return Claim("on_curve", label, {
-        "curve": "concertina",
-        "samples": samples.astype(np.float64),
-        "parameters": {
-            "body_gammas": p[:, 1:-1], "head_gamma": p[:, -1], "tail": p[:, 0], "omega": chain.omega,
-            "crossing": chain.crossing, "rule": "cut", "lead": chain.lead,
+    return Claim(
+        "on_curve",
+        label,
+        {
+            "curve": "concertina",
+            "samples": samples.astype(np.float64),
+            "parameters": {
+                "body_gammas": p[:, 1:-1],
+                "head_gamma": p[:, -1],
+                "tail": p[:, 0],
+                "omega": chain.omega,
+                "crossing": chain.crossing,
+                "rule": "cut",
+                "lead": chain.lead,
+            },
+            "unit": body.unit,
+            "pose": pose[samples],
+            "flip": flip,
+            "frames": frames,
+            "tolerance": ROUNDED * float(body.snake.lengths.min())
+            if body.gait.blend == "smooth"
+            else 1e-9 * float(body.snake.lengths.sum()),
         },
-        "unit": body.unit,
-        "pose": pose[samples],
-        "flip": flip,
-        "frames": frames,
-        "tolerance": ROUNDED * float(body.snake.lengths.min()) if body.gait.blend == "smooth"
-        else 1e-9 * float(body.snake.lengths.sum()),
-    })
+    )
 
 
 def _at_rest(body: ConcertinaBody, t: Array) -> list[Claim]:
@@ -117,14 +161,20 @@ def _at_rest(body: ConcertinaBody, t: Array) -> list[Claim]:
             tolerance, part = nearly, "front"
         if start >= t[-1] or end <= start:
             continue
-        out.append(Claim("at_rest", f"{part} at rest: {window.name}", {
-            "frames": [body.snake.frames[int(i)] for i in resting],
-            "start": start,
-            "end": min(end, float(t[-1])),
-            "every": cycle.period,
-            "stage": window.name,
-            "tolerance": tolerance,
-        }))
+        out.append(
+            Claim(
+                "at_rest",
+                f"{part} at rest: {window.name}",
+                {
+                    "frames": [body.snake.frames[int(i)] for i in resting],
+                    "start": start,
+                    "end": min(end, float(t[-1])),
+                    "every": cycle.period,
+                    "stage": window.name,
+                    "tolerance": tolerance,
+                },
+            )
+        )
     return out
 
 
@@ -143,9 +193,18 @@ def _undisturbed(sweep: Sweep) -> list[Window]:
 
 def _closes(body: ConcertinaBody, t: Array) -> list[Claim]:
     advance = [float(x) * body.unit for x in body.cycle.advance] + [0.0]
-    return [Claim("periodic", "the cycle closes", {
-        "period": body.cycle.period, "advance": advance, "turn": 0.0, "tolerance": 1e-9,
-    })]
+    return [
+        Claim(
+            "periodic",
+            "the cycle closes",
+            {
+                "period": body.cycle.period,
+                "advance": advance,
+                "turn": 0.0,
+                "tolerance": 1e-9,
+            },
+        )
+    ]
 
 
 def _presses(body: ConcertinaBody, walls: float | None) -> list[Claim]:
@@ -164,25 +223,38 @@ def notes_of(gait: Concertina, body: ConcertinaBody, walls: float | None) -> tup
         "The tail multiplier changes at the same rate as gamma, so its stage lasts 1/gamma_max times a module's.",
     ]
     if gait.contraction == "literal":
-        notes.append("Section IV.B as printed: with y = 0 upstream the body stays flat until the last stage of the "
-                     "contraction and then folds at once, with nothing anchored but the head.")
+        notes.append(
+            "Section IV.B as printed: with y = 0 upstream the body stays flat until the last stage of the "
+            "contraction and then folds at once, with nothing anchored but the head."
+        )
     elif gait.contraction == "mirror":
-        notes.append("Contraction: the point reflection of the time-reversed stretching instead of section IV.B, whose "
-                     "printed order keeps the body flat for most of the contraction.")
+        notes.append(
+            "Contraction: the point reflection of the time-reversed stretching instead of section IV.B, whose "
+            "printed order keeps the body flat for most of the contraction."
+        )
     else:
-        notes.append("Contraction: a travelling extension wave instead of section IV: the whole body is never stretched "
-                     "at once, so that folds grip behind the wave and ahead of it.")
+        notes.append(
+            "Contraction: a travelling extension wave instead of section IV: the whole body is never stretched "
+            "at once, so that folds grip behind the wave and ahead of it."
+        )
     if gait.blend == "smooth":
-        notes.append("The body curve has kinks where modules and the flat part meet. gamma changes by a C2 quintic, and "
-                     "the joint angles are a C2 spline through the fitted ones, so that accelerations are finite; joints "
-                     "leave the curve by a few per cent of a link while they round a kink.")
+        notes.append(
+            "The body curve has kinks where modules and the flat part meet. gamma changes by a C2 quintic, and "
+            "the joint angles are a C2 spline through the fitted ones, so that accelerations are finite; joints "
+            "leave the curve by a few per cent of a link while they round a kink."
+        )
     if body.lead > 0.0:
-        notes.append(f"The links are longer than the contracted curve: {body.lead * body.unit * 1e3:.3g} mm of the body "
-                     "stay straight.")
+        notes.append(
+            f"The links are longer than the contracted curve: {body.lead * body.unit * 1e3:.3g} mm of the body "
+            "stay straight."
+        )
     if walls is not None:
         notes.append(
             f"The contracted body is {body.width * 1e3:.4g} mm wide, {abs(walls) * 2e3:.3g} mm "
-            + ("more than the corridor: that squeeze is what grips." if walls > 0.0
-               else "less than the corridor: it does not touch the walls and has nothing to push against.")
+            + (
+                "more than the corridor: that squeeze is what grips."
+                if walls > 0.0
+                else "less than the corridor: it does not touch the walls and has nothing to push against."
+            )
         )
     return tuple(notes)

@@ -98,8 +98,8 @@ class ExtensionCycle:
         return self._sweep_clock.time(u + self.sweep.total)
 
     def _nodes(self, waves: int) -> Array:
-        """Even positions of a cycle of some waves, and those around every one at which a stage of a wave begins or ends:
-        joints may stand on a kink of the curve there and be fast on one side of it only."""
+        """Even positions of a cycle of some waves, and those around every place where a stage of a wave begins or
+        ends: joints may stand on a kink of the curve there and be fast on one side of it only."""
         span = self.whole / waves
         edges = [edge for w in self.sweep.windows for edge in (w.start, w.end)]
         places = np.array([self._place(u) for u in (*edges, self.sweep.launch_end, self.sweep.landing_start)])
@@ -156,7 +156,7 @@ class ExtensionCycle:
         knots = np.linspace(0.0, self.span, max(16, round(ROUNDING * self.span)) + 1)
         angles = self._sum(knots)[0]
         angles[-1] = angles[0]
-        return CubicSpline(knots, angles, bc_type="periodic")  # type: ignore[no-any-return]
+        return CubicSpline(knots, angles, bc_type="periodic")
 
     def _peak_rate(self) -> float:
         """Largest joint rate, found on a grid and once more around its peaks; PEAK_MARGIN for what lies between."""

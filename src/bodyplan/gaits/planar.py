@@ -63,8 +63,10 @@ def planar_snake(robot: Robot, gait: str) -> PlanarSnake:
     for x in stations:
         nearest = int(np.argmin(np.abs(along - x)))
         if abs(along[nearest] - x) > 1e-9 * length:
-            raise InputError(f"{gait}: needs straight links between frames; {robot.name!r} has a joint at "
-                             f"x = {x:.6g} m where no frame is (arc-shaped links?).")
+            raise InputError(
+                f"{gait}: needs straight links between frames; {robot.name!r} has a joint at "
+                f"x = {x:.6g} m where no frame is (arc-shaped links?)."
+            )
         snake_frames.append(robot.frames[nearest])
     # straight links: turning one joint must not move frames behind it
     return PlanarSnake(lengths, yaw, turn[yaw], tuple(snake_frames))
@@ -75,8 +77,10 @@ def level_floor(ground: Ground, points: Array, gait: str) -> float:
     heights = ground.height(points[..., 0], points[..., 1])
     spread = float(np.ptp(heights))
     if spread > 1e-9:
-        raise InputError(f"{gait}: moves in a plane and needs a flat, level floor; this one rises by {spread:.3g} m "
-                         "under the body's path.")
+        raise InputError(
+            f"{gait}: moves in a plane and needs a flat, level floor; this one rises by {spread:.3g} m "
+            "under the body's path."
+        )
     return float(np.mean(heights))
 
 

@@ -8,6 +8,7 @@ tail, module 1 .. N_B, head.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -70,7 +71,7 @@ def stretching(
     duration = np.where(np.arange(body_modules + 2) == 0, 1.0 / gamma_max, 1.0) / rates
     start = np.zeros(body_modules + 2)
     order = [*range(body_modules + 1, -1, -1)]
-    for before, after in zip(order[:-1], order[1:], strict=True):
+    for before, after in pairwise(order):
         start[after] = start[before] + (1.0 - overlap) * duration[before]
     zero = np.zeros_like(top)
     tail = np.arange(body_modules + 2) == 0

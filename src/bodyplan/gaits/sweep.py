@@ -90,12 +90,8 @@ def _transit(
     target: float,
     lows: Array,
     highs: Array,
-    front: tuple[
-        tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array
-    ],
-    back: tuple[
-        tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array
-    ],
+    front: tuple[tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array],
+    back: tuple[tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array],
     out: Array,
 ) -> None:
     """s for each u of a transit: gain(s) + gain(s - u) = target; warm-started along ascending u."""
@@ -110,11 +106,31 @@ def _transit(
             s = 0.5 * (low + high)
         for _ in range(200):
             a, a1, _, _ = body_at(
-                s, front[0], front[1], front[2], front[3], front[4], front[5], parameters, pieces, points, angles,
+                s,
+                front[0],
+                front[1],
+                front[2],
+                front[3],
+                front[4],
+                front[5],
+                parameters,
+                pieces,
+                points,
+                angles,
                 rates,
             )
             b, b1, _, _ = body_at(
-                s - u[i], back[0], back[1], back[2], back[3], back[4], back[5], parameters, pieces, points, angles,
+                s - u[i],
+                back[0],
+                back[1],
+                back[2],
+                back[3],
+                back[4],
+                back[5],
+                parameters,
+                pieces,
+                points,
+                angles,
                 rates,
             )
             miss, slope = a + b - target, a1 + b1

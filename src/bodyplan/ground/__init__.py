@@ -14,9 +14,7 @@ from bodyplan.ground.profile import Profile
 from bodyplan.ground.surface import Surface
 
 #: every ground by its name in mission files: a new ground is one class and one line here
-KINDS: dict[str, type[Ground]] = {
-    ground.kind: ground for ground in (Plane, Surface, HeightMap, Corridor, Profile)
-}
+KINDS: dict[str, type[Ground]] = {ground.kind: ground for ground in (Plane, Surface, HeightMap, Corridor, Profile)}
 
 __all__ = ["KINDS", "Corridor", "Ground", "HeightMap", "Plane", "Profile", "Solid", "Surface", "from_dict"]
 

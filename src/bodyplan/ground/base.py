@@ -112,9 +112,7 @@ class Ground(ABC):
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in self.__dict__:
-            raise AttributeError(
-                f"{type(self).__name__}.{name}: a ground cannot be changed; make another one."
-            )
+            raise AttributeError(f"{type(self).__name__}.{name}: a ground cannot be changed; make another one.")
         super().__setattr__(name, value)
 
     def __eq__(self, other: object) -> bool:
@@ -139,9 +137,7 @@ def planar(x: ArrayLike, y: ArrayLike | None) -> tuple[Array, Array]:
     try:
         bx, by = np.broadcast_arrays(*checked)
     except ValueError as error:
-        raise InputError(
-            f"x, y: shapes {checked[0].shape} and {checked[1].shape} do not broadcast."
-        ) from error
+        raise InputError(f"x, y: shapes {checked[0].shape} and {checked[1].shape} do not broadcast.") from error
     return bx, by
 
 

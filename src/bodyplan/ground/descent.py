@@ -35,9 +35,7 @@ def derivatives(points: Array, uv: Array, f: Array, g: Array, h: Array) -> tuple
     return slope, np.eye(2) + g[:, :, None] * g[:, None, :], e[:, None, None] * h
 
 
-def descend(
-    ground: JetFunction, points: Array, start: Array, low: Array, high: Array
-) -> tuple[Array, BoolArray]:
+def descend(ground: JetFunction, points: Array, start: Array, low: Array, high: Array) -> tuple[Array, BoolArray]:
     """A local minimum of phi in the box from ``low`` to ``high`` (n, 2), and whether it settled, (n,).
 
     Newton steps that lower phi, clipped to the box.

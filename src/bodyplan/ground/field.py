@@ -86,9 +86,7 @@ class Field(Ground):
         wanted = np.stack([corner[:2] for corner in region(low, high)])
         a, b = np.maximum(wanted[0], self.field_box[0]), np.minimum(wanted[1], self.field_box[1])
         if np.any(a >= b):
-            raise InputError(
-                f"{type(self).__name__}: no ground from {wanted[0]} to {wanted[1]}; {self._covers()}."
-            )
+            raise InputError(f"{type(self).__name__}: no ground from {wanted[0]} to {wanted[1]}; {self._covers()}.")
         size = b - a
         if cell is None:
             spacing = np.clip(self._spacing_for(a, b, 1e-4), size.max() / (MAX_SIDE - 1), size.max() / 32)

@@ -52,9 +52,7 @@ def read_grid(path: str | Path, height_range: tuple[float, float] | None, fill: 
 def check_size(rows: int, columns: int, where: str) -> None:
     """InputError unless the grid has at least 2 x 2 samples and at most MAX_SAMPLES."""
     if rows < 2 or columns < 2 or rows * columns > MAX_SAMPLES:
-        raise InputError(
-            f"{where}: needs at least 2 x 2 samples and at most {MAX_SAMPLES}, got {rows} x {columns}."
-        )
+        raise InputError(f"{where}: needs at least 2 x 2 samples and at most {MAX_SAMPLES}, got {rows} x {columns}.")
 
 
 def _npy(file: Path, height_range: Any, fill: Any) -> Grid:

@@ -90,9 +90,7 @@ class HeightMap(Field):
         grid = read_grid(path, height_range, fill)
         cell = grid.cell if cell is None else cell
         if cell is None:
-            raise InputError(
-                f"height map {str(path)!r}: the file does not say its cell size; give cell= in m."
-            )
+            raise InputError(f"height map {str(path)!r}: the file does not say its cell size; give cell= in m.")
         origin = (grid.origin or (0.0, 0.0)) if origin is None else origin
         return cls(grid.z, cell, origin, scale=scale, friction=friction)
 

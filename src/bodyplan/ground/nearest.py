@@ -137,9 +137,7 @@ class _Search:
         self.best[owner[first]], self.value[owner[first]] = uv[first], d[first]
 
 
-def _judge(
-    field: SmoothField, p: Array, centre: Array, low: Array, high: Array
-) -> tuple[Array, Array, BoolArray]:
+def _judge(field: SmoothField, p: Array, centre: Array, low: Array, high: Array) -> tuple[Array, Array, BoolArray]:
     """Of boxes: f at the centre, a lower bound of D, and whether phi is convex."""
     half = 0.5 * (high - low)
     radius = np.sqrt(np.sum(half**2, axis=1))

@@ -19,9 +19,7 @@ class Plane(Ground):
 
     kind = "plane"
 
-    def __init__(
-        self, height: float = 0.0, *, slope: ArrayLike = (0.0, 0.0), friction: float | None = None
-    ) -> None:
+    def __init__(self, height: float = 0.0, *, slope: ArrayLike = (0.0, 0.0), friction: float | None = None) -> None:
         self.level = number(height, "Plane.height")
         sx, sy = finite(slope, "Plane.slope", (2,))
         self.slope = (float(sx), float(sy))

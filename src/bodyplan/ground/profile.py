@@ -32,9 +32,7 @@ class Profile(Ground):
 
     kind = "profile"
 
-    def __init__(
-        self, floor: Levels = 0.0, ceiling: Levels | None = None, *, friction: float | None = None
-    ) -> None:
+    def __init__(self, floor: Levels = 0.0, ceiling: Levels | None = None, *, friction: float | None = None) -> None:
         self._floor_x, self._floor_z = _levels(floor, "Profile.floor", may_be_open=False)
         self._ceiling_x, self._ceiling_z = _levels(np.inf if ceiling is None else ceiling, "Profile.ceiling")
         self.friction = coulomb(friction, "Profile.friction")
@@ -112,9 +110,7 @@ def _levels(given: Levels, field: str, may_be_open: bool = True) -> tuple[Array,
         raise InputError(f"{wanted}, at least one and at most {MAX_STEPS}, got {len(steps)}.")
     for i, (x, z) in enumerate(steps):
         if not (np.isfinite(x) or (i == 0 and x == -np.inf)):
-            raise InputError(
-                f"{field}: step {i} must start at a finite x, got {x} (the first may start at -inf)."
-            )
+            raise InputError(f"{field}: step {i} must start at a finite x, got {x} (the first may start at -inf).")
         if not (np.isfinite(z) or (may_be_open and z == np.inf)):
             raise InputError(f"{field}: step {i} must have a finite z, got {z}.")
         if i and x <= steps[i - 1][0]:

@@ -65,9 +65,7 @@ class BicubicSpline:
         span = (b - a).max(axis=1, initial=0)
         level = np.ceil(np.log2(np.maximum(span, 1))).astype(np.int64)
         a, b = a >> level[:, None], b >> level[:, None]
-        blocks = [
-            offsets[level] + y * widths[level] + x for y in (a[:, 1], b[:, 1]) for x in (a[:, 0], b[:, 0])
-        ]
+        blocks = [offsets[level] + y * widths[level] + x for y in (a[:, 1], b[:, 1]) for x in (a[:, 0], b[:, 0])]
         lowest = np.minimum.reduce([tables[:, block] for block in blocks])
         z, xx, xy, yy = (np.stack([lowest[k], -lowest[k + 1]]) for k in (0, 2, 4, 6))
         hessian = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)

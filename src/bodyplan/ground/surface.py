@@ -36,16 +36,12 @@ class Surface(Field):
     ) -> None:
         self._expression = formula if isinstance(formula, Expression) else Expression(formula, ("x", "y"))
         if self._expression.variables != ("x", "y"):
-            raise InputError(
-                f"Surface: the variables of the formula must be x, y, got {self._expression.variables}."
-            )
+            raise InputError(f"Surface: the variables of the formula must be x, y, got {self._expression.variables}.")
         box = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
         if bounds is not None:
             box = finite(bounds, "Surface.bounds", (2, 2)).T
             if np.any(box[0] >= box[1]):
-                raise InputError(
-                    f"Surface.bounds: must be ((x low, x high), (y low, y high)), got {bounds!r}."
-                )
+                raise InputError(f"Surface.bounds: must be ((x low, x high), (y low, y high)), got {bounds!r}.")
         self._box = frozen(box)
         self.friction = coulomb(friction, "Surface.friction")
 

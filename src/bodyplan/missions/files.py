@@ -69,9 +69,7 @@ def load_mission(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Mis
     return parse_mission(content, path.stem, str(path), path.parent, overrides)
 
 
-def parse_mission(
-    text: str, name: str, where: str, folder: Path | None, overrides: Sequence[str] = ()
-) -> Mission:
+def parse_mission(text: str, name: str, where: str, folder: Path | None, overrides: Sequence[str] = ()) -> Mission:
     """The mission in a TOML ``text``; ``where`` names it in errors, ``folder`` is what its paths are relative to."""
     try:
         data = tomllib.loads(text)
@@ -86,7 +84,9 @@ def parse_mission(
         table = dict(getattr(model, section))
         kind = table.pop("kind", None)
         if kind is None:
-            raise InputError(f"{source.at((section,))}: [{section}] needs a kind, one of: {', '.join(sorted(registry))}.")
+            raise InputError(
+                f"{source.at((section,))}: [{section}] needs a kind, one of: {', '.join(sorted(registry))}."
+            )
         if not isinstance(kind, str) or kind not in registry:
             raise UnknownNameError(f"{section} kind", kind, registry, where=source.at((section, "kind")))
         builder, units = registry[kind]
@@ -105,8 +105,19 @@ def parse_mission(
     for other in model.compare:
         if other not in ready_missions():
             raise UnknownNameError("mission", other, ready_missions(), where=f"{source.at(('compare',))}: compare")
-    return Mission(name, model.title, model.about, built["robot"], built["gait"], built["ground"], model.time,
-                   model.simulate, tuple(model.compare), text, tuple(overrides))
+    return Mission(
+        name,
+        model.title,
+        model.about,
+        built["robot"],
+        built["gait"],
+        built["ground"],
+        model.time,
+        model.simulate,
+        tuple(model.compare),
+        text,
+        tuple(overrides),
+    )
 
 
 @dataclass(frozen=True)
@@ -118,7 +129,7 @@ class _Source:
     overrides: tuple[str, ...]
 
     def at(self, place: tuple[str | int, ...]) -> str:
-        """"file, line N" of a field, or of its section; the override that set it, if one did."""
+        """ "file, line N" of a field, or of its section; the override that set it, if one did."""
         dotted = ".".join(str(p) for p in place)
         for item in self.overrides:
             key = item.partition("=")[0].strip()

@@ -24,8 +24,14 @@ STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 Builder = Callable[..., Any]
 
-_SNAKE_UNITS = {"link_length": "length", "radius": "length", "mass": "mass", "limits": "angle", "rate": "angular_rate",
-                "effort": "torque"}
+_SNAKE_UNITS = {
+    "link_length": "length",
+    "radius": "length",
+    "mass": "mass",
+    "limits": "angle",
+    "rate": "angular_rate",
+    "effort": "torque",
+}
 
 
 def _robot_file(path: str) -> Robot:

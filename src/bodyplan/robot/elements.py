@@ -24,12 +24,7 @@ from bodyplan.errors import InputError
 
 
 def _named(value: object, field: str) -> str:
-    if (
-        not isinstance(value, str)
-        or not value
-        or value != value.strip()
-        or any(c in value for c in "\n\t,/\"'")
-    ):
+    if not isinstance(value, str) or not value or value != value.strip() or any(c in value for c in "\n\t,/\"'"):
         raise InputError(
             f"{field}: a name must be a non-empty text without spaces around it, commas, quotes or "
             f"slashes, got {value!r}."
@@ -109,9 +104,7 @@ class WheelRadius:
         if not isinstance(self.joint, Joint):
             raise InputError(f"WheelRadius.joint: expected a Joint, got {self.joint!r}.")
         if (self.joint.offset, self.joint.scale) != (0.0, 1.0):
-            raise InputError(
-                "WheelRadius.joint: offset must be 0 and scale 1, the law takes the angle itself."
-            )
+            raise InputError("WheelRadius.joint: offset must be 0 and scale 1, the law takes the angle itself.")
         number(self.link, "WheelRadius.link", above=0.0)
         number(self.rubber, "WheelRadius.rubber", at_least=0.0)
 
@@ -216,7 +209,7 @@ def _check_element(element: Element, kind: str) -> None:
 
 @dataclass(frozen=True)
 class Chain:
-    """A named sequence of elements from the ``parent`` frame on: ``"base"`` or a frame of an earlier chain."""
+    """A named sequence of elements from frame ``parent`` on: ``"base"`` or a frame of an earlier chain."""
 
     name: str
     elements: tuple[Element, ...]
@@ -232,9 +225,7 @@ class Chain:
             raise InputError(f"chain {self.name!r}: has no rows.")
         for i, element in enumerate(self.elements):
             if not isinstance(element, (Row, Arc)):
-                raise InputError(
-                    f"chain {self.name!r}, element {i + 1}: expected a Row or an Arc, got {element!r}."
-                )
+                raise InputError(f"chain {self.name!r}, element {i + 1}: expected a Row or an Arc, got {element!r}.")
 
     def frame_name(self, index: int) -> str:
         """Name of the frame that element ``index`` (from 0) ends in."""

@@ -52,7 +52,7 @@ def write_page(outcome: Outcome, path: Path) -> Path:
 
 def _write(outcome: Outcome, playback: Playback, drawn: Mapping[str, str], path: Path) -> Path:
     with replacing(path) as file:
-        file.write(page(outcome, playback, drawn))  # type: ignore[call-overload]
+        file.write(page(outcome, playback, drawn))
     return path
 
 
@@ -173,9 +173,7 @@ def _curves(outcome: Outcome, drawn: Mapping[str, str]) -> str:
     out = ""
     if "body_keyframes" in drawn:
         picture = base64.b64encode(drawn["body_keyframes"].encode("utf-8")).decode("ascii")
-        what = (
-            "planned and executed body" if outcome.trial is not None and outcome.trial.ok else "planned body"
-        )
+        what = "planned and executed body" if outcome.trial is not None and outcome.trial.ok else "planned body"
         out += (
             '<h3>The body at key frames</h3><div class="scroll picture" tabindex="0"><img alt="The '
             f'{what} at even times of one cycle" src="data:image/svg+xml;base64,{picture}"></div>'

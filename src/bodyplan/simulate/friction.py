@@ -89,6 +89,4 @@ class Scales:
         rx, ry, rz = (data.geom_xpos.take(self.geoms, 0) + self.down - data.subtree_com[1]).T
         _, _, ax, _, _, ay, _, _, az = data.geom_xmat.take(self.geoms, 0).T
         along = ax * (vx + wy * rz - wz * ry) + ay * (vy + wz * rx - wx * rz) + az * (vz + wx * ry - wy * rx)
-        model.pair_friction[self.pairs, 0] = np.where(
-            along < 0.0, self.friction.backward, self.friction.forward
-        )
+        model.pair_friction[self.pairs, 0] = np.where(along < 0.0, self.friction.backward, self.friction.forward)

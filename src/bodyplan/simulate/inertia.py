@@ -37,10 +37,7 @@ def inertial(body: Body, contacts: Sequence[Contact], previous: ArrayLike) -> In
         solids = [_solid(contact) for contact in contacts]
         volumes = np.array([s.mass for s in solids])
         centre = volumes @ np.array([s.com for s in solids]) / volumes.sum()
-        unit = (
-            sum((s.inertia + s.mass * _offset(s.com - centre) for s in solids), np.zeros((3, 3)))
-            / volumes.sum()
-        )
+        unit = sum((s.inertia + s.mass * _offset(s.com - centre) for s in solids), np.zeros((3, 3))) / volumes.sum()
     else:
         rod = -np.asarray(previous, dtype=np.float64)
         centre, unit = -0.5 * rod, _rod(rod, body.mass)
@@ -71,9 +68,7 @@ def _solid(contact: Contact) -> Inertial:
         return Inertial(volume, centre, volume / 3.0 * np.diag(half @ half - half**2))
     if contact.shape == "rim":
         volume = np.pi * r**2 * 2.0 * RIM_HALF_WIDTH * r
-        return Inertial(
-            volume, centre, volume * _cylinder(np.array([0.0, 0.0, 1.0]), r, 2.0 * RIM_HALF_WIDTH * r)
-        )
+        return Inertial(volume, centre, volume * _cylinder(np.array([0.0, 0.0, 1.0]), r, 2.0 * RIM_HALF_WIDTH * r))
     axis, length = axis_of(contact)
     tube, caps = np.pi * r**2 * length, 4.0 / 3.0 * np.pi * r**3
     # two half balls: 2/5 m r^2 about the axis; across it, their centroids lie 3r/8 outside the tube's ends

@@ -157,9 +157,7 @@ class Run:
             name, effort = robot.joints[column], robot.efforts[column]
             full = 100.0 * float(np.mean(np.abs(force[:, i]) >= effort * (1.0 - 1e-9)))
             if full > 0.0:
-                found.append(
-                    f"servo of joint {name!r} is at its effort {effort:.4g} for {full:.1f} % of the time"
-                )
+                found.append(f"servo of joint {name!r} is at its effort {effort:.4g} for {full:.1f} % of the time")
         low, high = robot.limits.T
         for column in np.flatnonzero(np.any((q < low) | (q > high), axis=0)):
             found.append(f"joint {robot.joints[column]!r} is pushed against its limit")
@@ -188,9 +186,7 @@ class Run:
         worst = int(np.argmax(np.where(np.isfinite(qvel), np.abs(qvel), np.inf)))
         name = model.joint(model.dof_jntid[worst]).name
         # records after the last finite state do not exist
-        good = np.isfinite(self._qpos[: self._count]).all(axis=1) & np.isfinite(self._com[: self._count]).all(
-            axis=1
-        )
+        good = np.isfinite(self._qpos[: self._count]).all(axis=1) & np.isfinite(self._com[: self._count]).all(axis=1)
         good &= np.isfinite(self._force[: self._count]).all(axis=1)
         self._count = int(np.argmin(good)) if not good.all() else self._count
         return f"at t = {self.data.time:.4g} s the velocity of joint {name!r} is {qvel[worst]:.3g}"

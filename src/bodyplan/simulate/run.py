@@ -74,9 +74,7 @@ def simulate(
         record_dt=number(record_dt, "record_dt", at_least=dt),
     )
     if timing.steps > MOST_STEPS:
-        raise InputError(
-            f"dt: {timing.steps} time steps are more than the {MOST_STEPS} allowed; got dt = {dt!r}."
-        )
+        raise InputError(f"dt: {timing.steps} time steps are more than the {MOST_STEPS} allowed; got dt = {dt!r}.")
     floor = as_friction(friction)
     low, high = region(reference, cycles)
     physics = build(
@@ -95,9 +93,7 @@ def simulate(
     with warnings_kept() as remarks, _reporting(progress) as report:
         data = mujoco().MjData(physics.model)
         q = reference.joints(timing.first_phase)
-        data.qpos[:] = physics.qpos(
-            q, on_the_floor(motion.robot, q, reference.base(timing.first_phase), motion.ground)
-        )
+        data.qpos[:] = physics.qpos(q, on_the_floor(motion.robot, q, reference.base(timing.first_phase), motion.ground))
         walls = Walls.around(physics, data)
         run = Run(physics, data, reference, timing, walls, report)
         run.go()
@@ -142,14 +138,9 @@ def _remarks_on(motion: Motion) -> list[str]:
     return [f"{bad} of {len(motion.t)} samples of the plan were not solved"] if bad else []
 
 
-def _settings(
-    physics: Physics, timing: Timing, floor: float | Friction | None, walls: Walls
-) -> dict[str, Any]:
+def _settings(physics: Physics, timing: Timing, floor: float | Friction | None, walls: Walls) -> dict[str, Any]:
     robot = physics.robot
-    gains = {
-        robot.joints[c]: [float(kp), float(kv)]
-        for c, (kp, kv) in zip(physics.servos, physics.gains, strict=True)
-    }
+    gains = {robot.joints[c]: [float(kp), float(kv)] for c, (kp, kv) in zip(physics.servos, physics.gains, strict=True)}
     same = next(iter(gains.values()), None)
     return {
         "friction": floor.to_dict() if isinstance(floor, Friction) else floor,

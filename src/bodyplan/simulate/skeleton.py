@@ -82,9 +82,7 @@ class _Builder:
         return uses
 
     def build(self) -> Drives:
-        base = self._body(
-            self.spec.worldbody, "base", np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), [], free=True
-        )
+        base = self._body(self.spec.worldbody, "base", np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), [], free=True)
         self._furnish(base, "base", self.robot.base_body, np.zeros(3), moves=True)
         for chain in self.robot.chains:
             parent = chain.parent
@@ -131,9 +129,7 @@ class _Builder:
             body = self._body(
                 self.bodies[parent], frame, rotate(back, there[:3] - here[:3]), multiply(back, there[3:]), []
             )
-            self._furnish(
-                body, frame, arc.body, -rotate(conjugate(there[3:]), there[:3] - here[:3]), moves=False
-            )
+            self._furnish(body, frame, arc.body, -rotate(conjugate(there[3:]), there[:3] - here[:3]), moves=False)
             return
         body = self.bodies[parent]
         k, piece = self.arc_joints, arc.length / self.arc_joints
@@ -160,9 +156,7 @@ class _Builder:
 
     # --- pieces ---------------------------------------------------------------------------------------------
 
-    def _body(
-        self, parent: Any, name: str, at: Array, turn: Array, hinges: list[_Hinge], free: bool = False
-    ) -> Any:
+    def _body(self, parent: Any, name: str, at: Array, turn: Array, hinges: list[_Hinge], free: bool = False) -> Any:
         body = parent.add_body(name=name, pos=at, quat=turn)
         self.bodies[name] = body
         if free:
@@ -238,9 +232,7 @@ def add_robot(spec: Any, robot: Robot, *, armature: float = 1e-3, arc_joints: in
     and for a wheel-radius drive.
     """
     if robot.mass <= 0.0:
-        raise InputError(
-            f"robot {robot.name!r}: has no mass; give its rows or its base a Body to simulate it."
-        )
+        raise InputError(f"robot {robot.name!r}: has no mass; give its rows or its base a Body to simulate it.")
     return _Builder(spec, robot, armature, arc_joints).build()
 
 

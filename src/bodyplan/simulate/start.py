@@ -84,9 +84,7 @@ class Walls:
                 return cls(geoms, home, model.geom_pos[geoms] - home)
             for geom, (depth, out) in deepest.items():
                 model.geom_pos[geom] += 1.001 * depth * out
-        raise InputError(
-            "the first pose of the motion reaches through a wall; there is no way to start from it."
-        )
+        raise InputError("the first pose of the motion reaches through a wall; there is no way to start from it.")
 
     @property
     def depth(self) -> float:

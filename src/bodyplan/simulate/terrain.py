@@ -32,13 +32,9 @@ def add_solid(spec: Any, solid: Solid) -> None:
     rgba = FLOOR_RGBA if solid.role == "floor" else WALL_RGBA
     plain: dict[str, Any] = {"name": name, "contype": 0, "conaffinity": 0, "rgba": rgba}
     if solid.kind == "plane":
-        spec.worldbody.add_geom(
-            type=mj.mjtGeom.mjGEOM_PLANE, pos=at, quat=solid.quaternion, size=[0, 0, 1.0], **plain
-        )
+        spec.worldbody.add_geom(type=mj.mjtGeom.mjGEOM_PLANE, pos=at, quat=solid.quaternion, size=[0, 0, 1.0], **plain)
     elif solid.kind == "box":
-        spec.worldbody.add_geom(
-            type=mj.mjtGeom.mjGEOM_BOX, pos=at, quat=solid.quaternion, size=solid.half, **plain
-        )
+        spec.worldbody.add_geom(type=mj.mjtGeom.mjGEOM_BOX, pos=at, quat=solid.quaternion, size=solid.half, **plain)
     else:
         if solid.z is None:
             raise InputError(f"solid {solid.name!r}: a field needs heights z.")
@@ -53,9 +49,7 @@ def add_solid(spec: Any, solid: Solid) -> None:
             size=[*half, rise, FIELD_BASE],
             userdata=((solid.z - bottom) / rise).ravel(),
         )
-        spec.worldbody.add_geom(
-            type=mj.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*(at[:2] + half), bottom], **plain
-        )
+        spec.worldbody.add_geom(type=mj.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*(at[:2] + half), bottom], **plain)
 
 
 def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: float | Friction | None) -> None:
@@ -66,9 +60,7 @@ def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: floa
             along, across = pair_friction(solid, contact, friction)
             if isinstance(friction, Friction) and solid.role == "floor":
                 if solid.kind != "plane":
-                    raise InputError(
-                        f"friction: scales need a plane floor, {solid.name!r} is a {solid.kind}."
-                    )
+                    raise InputError(f"friction: scales need a plane floor, {solid.name!r} is a {solid.kind}.")
                 if contact.shape != "capsule" or contact.start == contact.end:
                     raise InputError(f"friction: scales need capsules, contact {contact.name!r} is none.")
             spec.add_pair(
@@ -105,9 +97,7 @@ def scales_of(model: Any, robot: Robot, solids: tuple[Solid, ...], friction: Fri
     """The scales of every contact on every floor of a compiled model."""
     floors = [solid for solid in solids if solid.role == "floor"]
     pairs = [
-        (model.pair(f"{c.name} on {s.name}").id, model.geom(c.name).id, c, s)
-        for s in floors
-        for c in robot.contacts
+        (model.pair(f"{c.name} on {s.name}").id, model.geom(c.name).id, c, s) for s in floors for c in robot.contacts
     ]
     geoms = np.array([geom for _, geom, _, _ in pairs])
     normals = np.array([rotate(np.array(s.quaternion), np.array([0.0, 0.0, 1.0])) for *_, s in pairs])
