@@ -51,6 +51,12 @@ def test_figures_carry_units_and_never_show_what_is_not_a_number() -> None:
     assert figure(0.0184, "m/s") == "18.4\u00a0mm/s"
     assert figure(0.5, "N m") == "0.5\u00a0N\u00a0m"
     assert figure(0.0, "m") == "0\u00a0m"
+    assert [figure(x, digits=3, zeros=True) for x in (1.0, 184.0, 0.44, 0.99951)] == [
+        "1.00",
+        "184",
+        "0.440",
+        "1.00",
+    ]
     for value in (None, float("nan"), float("inf"), -float("inf")):
         assert figure(value, "m") == NOTHING
 
@@ -215,6 +221,17 @@ def test_outlines_have_the_area_of_their_shapes() -> None:
 def test_every_frame_without_a_capsule_has_a_bone() -> None:
     assert bones(snake_motion().robot) == []
     assert len(bones(cart().robot)) == 7
+
+
+def test_the_extent_holds_every_outline() -> None:
+    for motion in (snake_motion(), cart(), caterpillar()):
+        poses = motion.poses().array
+        low, high = extent([poses], motion.robot)
+        for axes in (TOP, SIDE):
+            for contact in motion.robot.contacts:
+                for pose in poses[:, motion.robot.frame_index(contact.frame)][::10]:
+                    points = np.concatenate(outline(contact, pose, axes))
+                    assert np.all(points >= low[list(axes)]) and np.all(points <= high[list(axes)])
 
 
 def test_ground_becomes_planes_faces_and_grids() -> None:

@@ -90,8 +90,8 @@ def test_the_page_says_the_numbers_of_the_run() -> None:
     text = words_of(full_outcome())
     advance = snake_motion().facts["advance_per_cycle"]
     ratio = 1.0 - LOST / advance
-    assert f"Physics executed {100 * ratio:.3g} % of the planned advance" in text
-    assert f"{1e3 * advance:.4g} mm {1e3 * (advance - LOST):.4g} mm {100 * ratio:.3g} %" in text
+    assert f"Physics executed {100 * ratio:#.3g} % of the planned advance" in text
+    assert f"{1e3 * advance:.4g} mm {1e3 * (advance - LOST):.4g} mm {100 * ratio:#.3g} %" in text
     assert f"{1e3 * LOST:.3g} mm of the planned {1e3 * advance:.4g} mm a cycle" in text
     for wanted in (
         "torque, peak 0.7331 N m",
@@ -249,6 +249,60 @@ PROBE = """<script>addEventListener("load", () => setTimeout(() => {
   root.dataset.blue = pixels.reduce((n, x, i) => n + (i % 4 === 2 && x > 120 && pixels[i - 2] < 70), 0);
   parent.postMessage({ ...root.dataset }, "*");
 }, 1500))</script>"""
+#: uses every control as a hand would, and tells what became of the replay
+HAND = """<script>addEventListener("load", () => setTimeout(() => {
+  const { state } = bodyplanReplay, root = document.documentElement.dataset;
+  const part = (name) => document.querySelector("[data-part=" + name + "]"), canvas = part("canvas");
+  canvas.setPointerCapture = () => {};
+  const pointer = (type, pointerId, x, y, more) => {
+    const box = canvas.getBoundingClientRect();
+    const at = { pointerId, clientX: box.left + x, clientY: box.top + y, bubbles: true, ...more };
+    canvas.dispatchEvent(new PointerEvent(type, at));
+  };
+  const press = (key) => canvas.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+  const moved = (what, act) => {
+    const before = JSON.stringify(what());
+    act();
+    root[act.name] = String(JSON.stringify(what()) !== before);
+  };
+  const drag = (more) => () => {
+    pointer("pointerdown", 1, 100, 100, more);
+    pointer("pointermove", 1, 150, 120, more);
+    pointer("pointerup", 1, 150, 120, more);
+  };
+  const view = () => [state.azimuth, state.elevation], frame = () => [state.scale, state.target];
+  moved(view, function turns() { drag({})(); });
+  moved(frame, function pans() { drag({ shiftKey: true })(); });
+  moved(frame, function pinches() {
+    pointer("pointerdown", 1, 100, 100);
+    pointer("pointerdown", 2, 200, 100);
+    pointer("pointermove", 2, 260, 100);
+    pointer("pointerup", 1, 100, 100);
+    pointer("pointerup", 2, 260, 100);
+  });
+  const wheel = () => canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -200, cancelable: true }));
+  moved(frame, function scrolls() { wheel(); });
+  canvas.focus();
+  moved(frame, function wheels() { wheel(); });
+  moved(frame, function zooms() { document.querySelector("[data-zoom]").click(); });
+  moved(view, function tops() { document.querySelector("[data-view=top]").click(); });
+  moved(() => state.t, function steps() { press("ArrowRight"); });
+  moved(() => state.t, function scrubs() {
+    part("scrub").value = "2.5";
+    part("scrub").dispatchEvent(new Event("input"));
+  });
+  root.scrubbed = state.t;
+  moved(() => state.speed, function speeds() {
+    part("speed").value = "4";
+    part("speed").dispatchEvent(new Event("change"));
+  });
+  moved(() => state.playing, function plays() { press(" "); });
+  moved(() => state.playing, function pauses() { part("play").click(); });
+  moved(() => state.follow, function follows() { document.querySelector("[data-toggle=follow]").click(); });
+  moved(() => state.t, function seeks() {
+    part("timeline").dispatchEvent(new MouseEvent("click", { clientX: 300, bubbles: true }));
+  });
+}, 800))</script>"""
 #: a window cannot be narrower than 500 pixels, a frame in it can
 AROUND = """<!doctype html><html><body style="margin:0"><script>
 addEventListener("message", (event) => Object.assign(document.documentElement.dataset, event.data));
@@ -303,12 +357,15 @@ def test_a_browser_runs_the_page_as_it_is(report: Path, browse) -> None:  # type
     assert dom.count('data-plot="') == dom.count('class="js-plotly-plot"') >= 8
 
 
+def with_script(content: str, script: str) -> str:
+    """A copy of the page that may run one more script."""
+    free = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", content)
+    return free.replace("</body></html>", f"{script}</body></html>")
+
+
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_page_fits_the_window(width: int, report: Path, content: str, tmp_path: Path, browse) -> None:  # type: ignore[no-untyped-def]
-    # a copy that may run the probe
-    probed = tmp_path / "probed.html"
-    open_content = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", content)
-    probed.write_text(open_content.replace("</body></html>", f"{PROBE}</body></html>"), encoding="utf-8")
+    (tmp_path / "probed.html").write_text(with_script(content, PROBE), encoding="utf-8")
     around = tmp_path / "around.html"
     around.write_text(AROUND.replace("{width}", str(width)), encoding="utf-8")
     found = attributes(browse(around, 1300), "html")
@@ -316,6 +373,18 @@ def test_the_page_fits_the_window(width: int, report: Path, content: str, tmp_pa
     assert int(found["data-inner"]) == width and int(found["data-scroll"]) <= width
     assert found["data-wide"] == ""
     assert int(found["data-blue"]) > 200  # the executed robot is in the picture
+
+
+def test_hands_move_the_replay(content: str, tmp_path: Path, browse) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "handled.html"
+    path.write_text(with_script(content, HAND), encoding="utf-8")
+    found = attributes(browse(path, 1000), "html")
+    assert "data-problems" not in found
+    assert found.pop("data-scrolls") == "false"  # the wheel belongs to the page until the picture is clicked
+    assert float(found.pop("data-scrubbed")) == 2.5
+    did = {name.removeprefix("data-"): value for name, value in found.items() if name.startswith("data-")}
+    names = "turns pans pinches wheels zooms tops steps scrubs speeds plays pauses follows seeks"
+    assert did == dict.fromkeys(names.split(), "true")
 
 
 def test_playing_moves_on(report: Path, browse) -> None:  # type: ignore[no-untyped-def]

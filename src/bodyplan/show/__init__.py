@@ -41,9 +41,7 @@ def show(
     if trial is not None and not isinstance(trial, Trial):
         raise InputError(f"trial: expected a Trial or None, got {trial!r}.")
     if trial is not None and trial.joints != motion.joints:
-        raise InputError(
-            f"trial: its {len(trial.joints)} joints are not those of the motion ({len(motion.joints)})."
-        )
+        raise InputError(f"trial: its {len(trial.joints)} joints are not those of the motion ({len(motion.joints)}).")
     if path is None:
         path = Path(tempfile.mkdtemp(prefix="bodyplan.")) / "report.html"
     gait = str(motion.gait.get("kind", "motion"))

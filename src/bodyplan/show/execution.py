@@ -95,9 +95,7 @@ def _figures(trial: Trial, playback: Playback) -> list[tuple[str, str, str, str]
     rows.append(("speed", figure(speed, "m/s"), figure(reached, "m/s"), percent(share)))
     drift = "drift to the left" + (" a cycle" if cyclic else "")
     rows.append((drift, figure(0.0, "m"), figure(found["sideways_m"], "m"), ""))
-    return rows + [
-        (what, "", figure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if key in found
-    ]
+    return rows + [(what, "", figure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if key in found]
 
 
 def _losses(trial: Trial, playback: Playback) -> str:
@@ -118,9 +116,7 @@ def _losses(trial: Trial, playback: Playback) -> str:
     head = ("stage", "time in the cycle", "slip along", "largest slip", "executed − planned advance")
     return (
         f"<h3>Where the advance goes</h3>\n<p>{_loss_in_words(trial, playback)}</p>"
-        + plot(
-            "slip", "Negative: backwards. Stages may overlap, then their losses do not add up to the whole."
-        )
+        + plot("slip", "Negative: backwards. Stages may overlap, then their losses do not add up to the whole.")
         + plot("lag", "How the executed advance falls behind the planned one within a cycle.")
         + folded(f"Table of all {counted(len(cells), 'stage')}", table(head, cells, numbers=(1, 2, 3, 4)))
     )
@@ -134,9 +130,7 @@ def _loss_in_words(trial: Trial, playback: Playback) -> str:
     lost = (1.0 - ratio) * planned
     if lost <= 0.0:
         return f"The executed advance is no shorter than the planned one ({percent(ratio)}). {SLIP}"
-    most = listed(
-        f"{esc(row.name)} ({figure(row.lag, 'm', 3)})" for row in worst(stage_rows(playback, trial))
-    )
+    most = listed(f"{esc(row.name)} ({figure(row.lag, 'm', 3)})" for row in worst(stage_rows(playback, trial)))
     cycle = "a cycle" if playback.period is not None else "in all"
     return (
         f"<b>{figure(lost, 'm', 3)} of the planned {figure(planned, 'm')} {cycle} "

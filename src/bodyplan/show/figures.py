@@ -83,18 +83,14 @@ def joint_rates(outcome: Outcome, playback: Playback) -> Figure | None:
     return _joint_figure(playback, playback.motion.qd, lambda g: f"joint rate ({g.rate_unit})", True)
 
 
-def _joint_figure(
-    playback: Playback, values: Any, label: Callable[[JointGroup], str], rates: bool
-) -> Figure | None:
+def _joint_figure(playback: Playback, values: Any, label: Callable[[JointGroup], str], rates: bool) -> Figure | None:
     groups = joint_groups(playback.motion)
     if not groups:
         return None
     chosen = one_cycle(playback)
     t = playback.motion.t[chosen] - playback.motion.t[0]
     figure = new_figure(5.2 * len(groups))
-    axes = figure.subplots(
-        2 * len(groups), 1, sharex=True, squeeze=False, height_ratios=[1.5, 1.0] * len(groups)
-    )[:, 0]
+    axes = figure.subplots(2 * len(groups), 1, sharex=True, squeeze=False, height_ratios=[1.5, 1.0] * len(groups))[:, 0]
     for group, (top, below) in zip(groups, axes.reshape(-1, 2), strict=True):
         shown = values[np.ix_(chosen, group.columns)]
         most = float(np.abs(shown).max(initial=0.0)) or 1.0

@@ -28,9 +28,9 @@ SOLID = {"facecolor": PLANNED, "edgecolor": "#ffffff", "linewidth": 0.5}
 REAL = {"facecolor": EXECUTED, "edgecolor": "#ffffff", "linewidth": 0.5}
 
 
-def body_keyframes(playback: Playback, new_figure: Callable[[float], Figure]) -> Figure:
-    """The planned body and, over it, the executed one at even times of the first cycle."""
-    chosen = _frames(playback)
+def body_keyframes(playback: Playback, new_figure: Callable[[float], Figure], frames: int = FRAMES) -> Figure:
+    """The planned body and, over it, the executed one at ``frames`` even times of the first cycle."""
+    chosen = _frames(playback, frames)
     tracks = [playback.planned[chosen]]
     if playback.executed is not None:
         tracks.append(playback.executed[chosen[chosen < len(playback.executed)]])
@@ -66,8 +66,8 @@ def view_of(playback: Playback) -> tuple[int, int]:
     return SIDE if sideways < 0.5 * upwards else TOP
 
 
-def _frames(playback: Playback) -> IntArray:
-    times = np.linspace(0.0, min(playback.span, float(playback.t[-1])), FRAMES)
+def _frames(playback: Playback, frames: int) -> IntArray:
+    times = np.linspace(0.0, min(playback.span, float(playback.t[-1])), frames)
     return np.unique(np.abs(playback.t[None, :] - times[:, None]).argmin(axis=1)).astype(np.int64)
 
 
@@ -92,9 +92,7 @@ def _in_one(
     for index in chosen:
         _robots(ax, playback, int(index), axes)
         x, y = playback.planned_centre[index, list(axes)]
-        ax.annotate(
-            f"{playback.t[index]:.2f} s", (x, y), fontsize=7, xytext=(0, 9), textcoords="offset points"
-        )
+        ax.annotate(f"{playback.t[index]:.2f} s", (x, y), fontsize=7, xytext=(0, 9), textcoords="offset points")
     _frame(ax, low, high, axes, last=True, first=True)
     _legend(figure, playback)
     return figure
@@ -163,8 +161,6 @@ def _frame(ax: Axes, low: Array, high: Array, axes: tuple[int, int], *, last: bo
 def _legend(figure: Figure, playback: Playback) -> None:
     from matplotlib.patches import Patch
 
-    styles = (
-        {"planned": SOLID} if playback.executed is None else {"planned": GHOST, "executed in physics": REAL}
-    )
+    styles = {"planned": SOLID} if playback.executed is None else {"planned": GHOST, "executed in physics": REAL}
     handles = [Patch(facecolor=str(style["facecolor"]), label=name) for name, style in styles.items()]
     figure.legend(handles=handles, loc="outside upper right", ncols=2, fontsize=8)

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import platform
 from dataclasses import dataclass
+from importlib import import_module  # the package itself is above every floor and is looked up by name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bodyplan import __version__
 from bodyplan.check import Report
 from bodyplan.motion import Motion
 from bodyplan.rates import five_point
@@ -74,9 +74,7 @@ class Variant:
     def of(cls, label: str, motion: Motion) -> Variant:
         """Measured on a motion with even samples."""
         rate, acceleration = five_point_rates(motion)
-        return cls(
-            label, *(float(np.abs(a).max(initial=0.0)) for a in (motion.qd, motion.qdd, rate, acceleration))
-        )
+        return cls(label, *(float(np.abs(a).max(initial=0.0)) for a in (motion.qd, motion.qdd, rate, acceleration)))
 
     def to_dict(self) -> dict[str, Any]:
         """JSON types."""
@@ -134,7 +132,8 @@ class Outcome:
     @property
     def versions(self) -> dict[str, str]:
         """Versions of what made the numbers."""
-        versions = {"bodyplan": __version__, "python": platform.python_version(), "numpy": np.__version__}
+        versions = {"bodyplan": str(import_module("bodyplan").__version__)}
+        versions |= {"python": platform.python_version(), "numpy": np.__version__}
         if self.trial is not None and "mujoco" in self.trial.settings:
             versions["mujoco"] = str(self.trial.settings["mujoco"])
         return versions

@@ -13,9 +13,7 @@ from bodyplan.show.text import counted, esc, figure, listed, percent, plain, uni
 
 def head(outcome: Outcome, playback: Playback) -> str:
     """Title, what it is about, one sentence, verdict and tiles."""
-    about = "".join(
-        f'<p class="about">{esc(part)}</p>' for part in outcome.about.split("\n\n") if part.strip()
-    )
+    about = "".join(f'<p class="about">{esc(part)}</p>' for part in outcome.about.split("\n\n") if part.strip())
     return (
         f'<header><p class="kicker">bodyplan report</p><h1>{esc(outcome.title)}</h1>{about}'
         f"<p>{sentence(outcome, playback)}</p></header>\n{verdict(outcome)}\n{tiles(outcome, playback)}"
@@ -36,9 +34,7 @@ def sentence(outcome: Outcome, playback: Playback) -> str:
         many = "" if abs(cycles - 1.0) < 1e-9 else "s"
         time += f" ({figure(cycles)} cycle{many} of {figure(playback.period, 's')})"
     if trial is not None:
-        executed = (
-            counted(trial.cycles, "cycle") if playback.period is not None else figure(trial.period, "s")
-        )
+        executed = counted(trial.cycles, "cycle") if playback.period is not None else figure(trial.period, "s")
         time += f", and executed in physics for {executed}"
     return (
         f"The robot “{esc(robot.name)}”, with {counted(robot.n, 'joint')}{mass}, {moves} on "
@@ -112,17 +108,21 @@ def tiles(outcome: Outcome, playback: Playback) -> str:
         if (mine := np.array([k == kind for k in motion.robot.kinds], dtype=bool)).any()
     ]
     peaks = [
-        figure(measured[key], unit, 3)
+        figure(measured[key], unit, 3, zeros=True)
         for key, unit in (("peak_torque_Nm", "N m"), ("peak_force_N", "N"))
         if measured.get(key)
     ]
     cost = measured.get("cost_of_transport")
     items = [
-        ("Planned advance", figure(advance, "m", 3), a_cycle),
+        ("Planned advance", figure(advance, "m", 3, zeros=True), a_cycle),
         ("Executed / planned", percent(measured.get("advance_ratio")), none or "mean of the cycles"),
-        ("Speed", figure(speed, "m/s", 3), none or f"planned {figure(advance / playback.span, 'm/s', 3)}"),
+        (
+            "Speed",
+            figure(speed, "m/s", 3, zeros=True),
+            none or f"planned {figure(advance / playback.span, 'm/s', 3, zeros=True)}",
+        ),
         ("Peak load of a joint", " · ".join(peaks) or figure(None), none or "executed"),
-        ("Cost of transport", figure(cost, digits=3), none or "work / (weight × distance)"),
+        ("Cost of transport", figure(cost, digits=3, zeros=True), none or "work / (weight × distance)"),
         ("Peak joint rate", " · ".join(value for value, _ in rates) or figure(None), "planned"),
     ]
     cells = "".join(

@@ -107,9 +107,7 @@ class Playback:
         """Executed minus planned advance (E,) m; None where nothing was executed."""
         if self.executed_centre is None:
             return None
-        return self.advance(self.executed_centre) - self.advance(
-            self.planned_centre[: len(self.executed_centre)]
-        )
+        return self.advance(self.executed_centre) - self.advance(self.planned_centre[: len(self.executed_centre)])
 
 
 def centre_of_mass(robot: Robot, poses: Array) -> Array:

@@ -48,12 +48,8 @@ def plots(outcome: Outcome, playback: Playback) -> dict[str, Plot]:
         "five_point": five_point(outcome),
     }
     for group in joint_groups(playback.motion):
-        made[f"angles_{group.kind}"] = heat_map(
-            playback, group, playback.motion.q, f"joint {group.kind}", group.unit
-        )
-        made[f"rates_{group.kind}"] = heat_map(
-            playback, group, playback.motion.qd, "joint rate", group.rate_unit
-        )
+        made[f"angles_{group.kind}"] = heat_map(playback, group, playback.motion.q, f"joint {group.kind}", group.unit)
+        made[f"rates_{group.kind}"] = heat_map(playback, group, playback.motion.qd, "joint rate", group.rate_unit)
         made[f"fastest_{group.kind}"] = fastest(playback, group)
         made[f"load_{group.kind}"] = load_over_time(outcome, group)
         made[f"loads_{group.kind}"] = load_by_joint(outcome, group)

@@ -19,12 +19,10 @@ def scene(playback: Playback) -> dict[str, Any]:
     """The replay's data; arrays are base64 of little-endian float32."""
     robot = playback.motion.robot
     joined = bones(robot)
-    frames = sorted(
-        {robot.frame_index(c.frame) for c in robot.contacts} | {i for pair in joined for i in pair} | {0}
-    )
+    frames = sorted({robot.frame_index(c.frame) for c in robot.contacts} | {i for pair in joined for i in pair} | {0})
     place = {frame: i for i, frame in enumerate(frames)}
     tracks = [p for p in (playback.planned, playback.executed) if p is not None]
-    low, high = extent([p[:, frames] for p in tracks], robot, frames)
+    low, high = extent(tracks, robot)
     stages = stages_of(playback)
     return {
         "t": packed(playback.t),
@@ -99,7 +97,6 @@ def _ground(playback: Playback, low: Array, high: Array) -> dict[str, Any]:
             for f in found.faces
         ],
         "fields": [
-            {"x": packed(x), "y": packed(y), "z": packed(z), "nx": len(x), "ny": len(y)}
-            for x, y, z in found.fields
+            {"x": packed(x), "y": packed(y), "z": packed(z), "nx": len(x), "ny": len(y)} for x, y, z in found.fields
         ],
     }

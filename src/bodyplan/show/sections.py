@@ -70,9 +70,7 @@ def comparison(outcome: Outcome) -> str:
         "cost of transport",
     )
     rows = [_compared(outcome.itself, True), *(_compared(other, False) for other in outcome.others)]
-    return section(
-        "comparison", "Beside other missions", table(head, rows, kind="compare", numbers=range(2, 8))
-    )
+    return section("comparison", "Beside other missions", table(head, rows, kind="compare", numbers=range(2, 8)))
 
 
 def _compared(other: Comparison, mine: bool) -> tuple[str, ...]:
@@ -85,7 +83,7 @@ def _compared(other: Comparison, mine: bool) -> tuple[str, ...]:
         figure(other.planned_speed, "m/s"),
         figure(other.peak_joint_rate, "rad/s"),
         figure(other.peak_torque, "N m"),
-        figure(other.cost_of_transport, digits=3),
+        figure(other.cost_of_transport, digits=3, zeros=True),
     )
 
 
@@ -142,9 +140,7 @@ def notes(outcome: Outcome) -> str:
         out += folded("Numbers of the plan (SI units, rad)", pairs(facts))
     out += folded("Options of gait and ground (SI units, rad)", pairs(options_rows(outcome)))
     if outcome.mission_text.strip():
-        changed = "".join(
-            f"<p>Changed for this run: <code>{esc(item)}</code></p>" for item in outcome.overrides
-        )
+        changed = "".join(f"<p>Changed for this run: <code>{esc(item)}</code></p>" for item in outcome.overrides)
         out += folded("Mission file (TOML)", f"{changed}<pre>{esc(outcome.mission_text.strip())}</pre>")
     out += folded("Load the motion in Python", f"<pre>{esc(LOAD)}</pre>")
     versions = ", ".join(f"{name} {version}" for name, version in outcome.versions.items())

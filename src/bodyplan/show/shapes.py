@@ -51,17 +51,20 @@ def thickness(robot: Robot, poses: Array) -> float:
     return min([0.015 * size, *(0.6 * r for r in radii)]) if size > 0.0 else 0.01
 
 
-def extent(poses: Sequence[Array], robot: Robot, frames: Sequence[int] | None = None) -> tuple[Array, Array]:
-    """Corners (3,), (3,) m of a box around robots whose ``frames`` (all by default) have poses (..., f,
-    7)."""
-    chosen = list(range(len(robot.frames)) if frames is None else frames)
-    reach = np.zeros((len(robot.frames), 1))
-    for c in robot.contacts:
-        i = robot.frame_index(c.frame)
-        reach[i] = max(float(reach[i, 0]), c.radius + float(np.linalg.norm(c.half)))
-    places = np.concatenate([p[..., :3].reshape(-1, len(chosen), 3) for p in poses])
-    low = (places - reach[chosen]).min(axis=(0, 1))
-    high = (places + reach[chosen]).max(axis=(0, 1))
+def extent(poses: Sequence[Array], robot: Robot) -> tuple[Array, Array]:
+    """Corners (3,), (3,) m of a box around robots whose frames have poses (..., f, 7), contacts included."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for track in poses:
+        reached = [(track[..., :3], 0.0)]
+        for c in robot.contacts:
+            pose = track[..., robot.frame_index(c.frame), :]
+            for end in {c.start, c.end if c.shape == "capsule" else c.start}:
+                at = pose[..., :3] + rotate(pose[..., 3:], np.array(end))
+                reached.append((at, c.radius + float(np.linalg.norm(c.half))))
+        for points, reach in reached:
+            flat = points.reshape(-1, 3)
+            low = np.minimum(low, flat.min(axis=0) - reach)
+            high = np.maximum(high, flat.max(axis=0) + reach)
     margin = 0.01 * float(np.linalg.norm(high - low)) + 1e-3
     return low - margin, high + margin
 
@@ -117,9 +120,7 @@ def scenery(ground: Ground, low: Array, high: Array) -> Scenery:
     wide, near = (np.array([share, share, 0.0]) * size for share in (0.2, 0.03))
     up = np.array([0.0, 0.0, 0.25 * size])
     solids = ground.solids(low - wide - 0.1 * up, high + wide + up)
-    planes = [
-        plane for s in solids if s.kind == "plane" for plane in _quadrilateral(s, low - wide, high + wide)
-    ]
+    planes = [plane for s in solids if s.kind == "plane" for plane in _quadrilateral(s, low - wide, high + wide)]
     below, above = low - near - 0.1 * up, high + near + up
     # what of a wall is under a plane floor would only be drawn over it
     foot = np.maximum(below, [-np.inf, -np.inf, min((float(p[:, 2].min()) for p in planes), default=-np.inf)])
@@ -137,9 +138,7 @@ def _quadrilateral(solid: Solid, low: Array, high: Array) -> list[Array]:
     normal = rotate(np.array(solid.quaternion), np.array([0.0, 0.0, 1.0]))
     if abs(normal[2]) < 1e-6:
         return []
-    corners = np.array(
-        [[low[0], low[1], 0.0], [high[0], low[1], 0.0], [high[0], high[1], 0.0], [low[0], high[1], 0.0]]
-    )
+    corners = np.array([[low[0], low[1], 0.0], [high[0], low[1], 0.0], [high[0], high[1], 0.0], [low[0], high[1], 0.0]])
     at = np.array(solid.position)
     corners[:, 2] = at[2] - ((corners[:, :2] - at[:2]) @ normal[:2]) / normal[2]
     return [corners]
@@ -159,8 +158,6 @@ def _box(solid: Solid, number: int, low: Array, high: Array) -> list[Face]:
 
 def _grid(solid: Solid) -> tuple[Array, Array, Array]:
     assert solid.z is not None
-    rows, columns = (
-        np.unique(np.linspace(0, n - 1, min(n, MOST_SIDE)).round().astype(int)) for n in solid.z.shape
-    )
+    rows, columns = (np.unique(np.linspace(0, n - 1, min(n, MOST_SIDE)).round().astype(int)) for n in solid.z.shape)
     x, y = solid.position[0] + columns * solid.cell[0], solid.position[1] + rows * solid.cell[1]
     return x, y, np.asarray(solid.z[np.ix_(rows, columns)])

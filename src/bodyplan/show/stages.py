@@ -119,7 +119,5 @@ def _stage_of(stages: Sequence[Stage], name: str, start: float, end: float) -> i
 def worst(rows: Sequence[StageRow], count: int = 3) -> list[StageRow]:
     """The stages in which most advance is lost, worst first: those with at least a tenth of the worst one's
     loss."""
-    losing = sorted(
-        (row for row in rows if row.lag is not None and row.lag < 0.0), key=lambda row: row.lag or 0.0
-    )
+    losing = sorted((row for row in rows if row.lag is not None and row.lag < 0.0), key=lambda row: row.lag or 0.0)
     return [row for row in losing[:count] if (row.lag or 0.0) <= 0.1 * (losing[0].lag or 0.0)]

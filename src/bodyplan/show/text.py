@@ -31,20 +31,23 @@ def esc(value: object) -> str:
     return html.escape(str(value), quote=True)
 
 
-def figure(value: float | None, unit: str = "", digits: int = 4) -> str:
-    """A number with its unit; lengths and speeds below 1 m in mm; a dash for None and what is not finite."""
+def figure(value: float | None, unit: str = "", digits: int = 4, *, zeros: bool = False) -> str:
+    """A number with its unit; lengths and speeds below 1 m in mm; a dash for None and what is not finite.
+    ``zeros`` keeps those that end a fraction, so that all digits are there."""
     if value is None or not math.isfinite(value):
         return NOTHING
     if unit in ("m", "m/s") and 1e-6 <= abs(value) < 1.0:
         value, unit = 1e3 * value, "m" + unit
-    mantissa, _, power = f"{value:.{digits}g}".partition("e")
+    shown = f"{value:#.{digits}g}" if zeros else f"{value:.{digits}g}"
+    mantissa, _, power = shown.partition("e")
+    mantissa = mantissa.removesuffix(".")
     text = mantissa.replace("-", "−") + (f"×10{str(int(power)).translate(_RAISED)}" if power else "")
     return f"{text} {unit}".replace(" ", "\u00a0") if unit else text
 
 
 def percent(value: float | None) -> str:
     """A share as a percentage."""
-    return figure(None if value is None else 100.0 * value, "%", 3)
+    return figure(None if value is None else 100.0 * value, "%", 3, zeros=True)
 
 
 def unit_of(name: str) -> str:
@@ -77,9 +80,7 @@ def plain(value: Any) -> str:
 def listed(items: Iterable[str]) -> str:
     """ "a, b and c"."""
     all_items = list(items)
-    return (
-        " and ".join([", ".join(all_items[:-1]), all_items[-1]]) if len(all_items) > 1 else "".join(all_items)
-    )
+    return " and ".join([", ".join(all_items[:-1]), all_items[-1]]) if len(all_items) > 1 else "".join(all_items)
 
 
 def counted(number: int, noun: str) -> str:
@@ -87,16 +88,13 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, kind: str = "", numbers: Sequence[int] = ()
-) -> str:
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, kind: str = "", numbers: Sequence[int] = ()) -> str:
     """An HTML table in a box of its own that scrolls sideways. Cells are HTML: escape them first; ``numbers``
     are the columns to align at the right."""
     right = dict.fromkeys(numbers, ' class="n"')
     top = "".join(f'<th scope="col"{right.get(i, "")}>{cell}</th>' for i, cell in enumerate(head))
     body = "".join(
-        "<tr>" + "".join(f"<td{right.get(i, '')}>{cell}</td>" for i, cell in enumerate(row)) + "</tr>\n"
-        for row in rows
+        "<tr>" + "".join(f"<td{right.get(i, '')}>{cell}</td>" for i, cell in enumerate(row)) + "</tr>\n" for row in rows
     )
     return (
         f'<div class="scroll" tabindex="0"><table class="{esc(kind)}"><thead><tr>{top}</tr></thead>\n'
