@@ -111,13 +111,13 @@ def declare(chains: tuple[Chain, ...], joints: Sequence[Joint | str]) -> tuple[C
 
 def _all_of(kind: type[Any], items: Any, field: str) -> tuple[Any, ...]:
     try:
-        items = tuple(items)
+        checked = tuple(items)
     except TypeError as error:
         raise InputError(f"{field}: expected a sequence of {kind.__name__}, got {items!r}.") from error
-    for item in items:
+    for item in checked:
         if not isinstance(item, kind):
             raise InputError(f"{field}: expected {kind.__name__}, got {item!r}.")
-    return items
+    return checked
 
 
 def _check_names(chains: tuple[Chain, ...]) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -48,7 +47,7 @@ def joint_array(
 
 
 def flatten(q: Array, base: ArrayLike | None) -> tuple[tuple[int, ...], Array, Array]:
-    """(batch shape, q (B n,), base (B or 1, 7), or (0, 7) for None) for the kernels, contiguous and writeable."""
+    """(batch shape, q (B n,), base (B or 1, 7), or (0, 7) for None), contiguous and writeable."""
     shape = q.shape[:-1]
     if base is None:
         return shape, plain(q).reshape(-1), NO_POSE
@@ -86,11 +85,11 @@ def plain(a: Array) -> Array:
 def run(q: Array, size: int, kernel: Callable[[int, int], int]) -> None:
     """Call ``kernel(first, last)`` over ``size`` configurations, large batches in several threads.
 
-    Threads of our own and kernels without the GIL, rather than Numba's prange: that would compile every kernel
-    a second time, and its portable threading layer aborts the process when two threads call it. NUMBA_NUM_THREADS
-    sets their number. InputError for ``q`` when a kernel met a number that is not finite.
+    Threads of our own and kernels without the GIL, rather than Numba's prange: that would compile every
+    kernel a second time, and its portable threading layer aborts the process when two threads call it.
+    NUMBA_NUM_THREADS sets their number. InputError for ``q`` when a kernel met a number that is not finite.
     """
-    threads = min(numba.config.NUMBA_NUM_THREADS, size // (SHARED_FROM // 2))
+    threads = min(_threads(), size // (SHARED_FROM // 2))
     if size < SHARED_FROM or threads < 2:
         bad = kernel(0, size)
     else:
@@ -101,6 +100,12 @@ def run(q: Array, size: int, kernel: Callable[[int, int], int]) -> None:
     if bad >= 0:
         finite(q, "q")
         raise InputError("q: too large, a variable that it drives is not finite.")
+
+
+def _threads() -> int:
+    from numba import config
+
+    return int(getattr(config, "NUMBA_NUM_THREADS", 1))  # set as a module attribute when Numba starts
 
 
 def variable(value: Variable, q: Array, column: Mapping[str, int]) -> Any:

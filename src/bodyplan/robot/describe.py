@@ -144,7 +144,8 @@ def _element(data: Any, where: str) -> Element:
         known["length"] = quantity(known["length"], "length", f"{where}.length")
     if known.get("body") is not None:
         known["body"] = _made(Body, known["body"], f"{where}.body")
-    return _build(make, known, where)
+    element: Element = _build(make, known, where)
+    return element
 
 
 def _joint(data: Any, where: str, kinds: Mapping[str, str]) -> Joint | str:
@@ -161,7 +162,8 @@ def _joint(data: Any, where: str, kinds: Mapping[str, str]) -> Joint | str:
             known[field] = quantity(known[field], dimension, f"{where}.{field}")
     if not isinstance(known.get("actuated", True), bool):
         raise InputError(f"{where}.actuated: must be true or false, got {known['actuated']!r}.")
-    return _build(Joint, known, where)
+    joint: Joint = _build(Joint, known, where)
+    return joint
 
 
 def _limit(value: Any, kind: str, where: str) -> float:

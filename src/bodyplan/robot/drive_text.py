@@ -65,8 +65,8 @@ def variable(value: Any, dimension: str, where: str, unit: str | None = None) ->
         found = _JOINT.fullmatch(term)
         if not found or joint is not None:
             raise InputError(
-                f"{where}: {value!r} is neither a {dimension} such as {_EXAMPLE[dimension]} nor one joint with "
-                "a factor and an offset such as 'knee', '0.5*knee', 'knee + 0.1' (spaces around + and -)."
+                f"{where}: {value!r} is neither a {dimension} such as {_EXAMPLE[dimension]} nor one joint "
+                "with a factor and an offset such as '0.5*knee' or 'knee + 0.1' (spaces around + and -)."
             )
         scale = sign * (-1.0 if found["minus"] else 1.0) * float(found["before"] or 1.0)
         if found["after"]:

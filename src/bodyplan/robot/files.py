@@ -83,10 +83,10 @@ def read_table(path: str | os.PathLike[str]) -> tuple[str, tuple[Chain, ...]]:
     """Name (of the file) and chains from a CSV table of the extended D-H parameters, one row a line.
 
     Columns, in any order: ``chain, from, to, theta, d, a, epsilon`` and optionally ``limit_low, limit_high,
-    rate, effort`` (of the one joint in the row), ``passive`` (yes/no: that joint has no actuator) and ``mass``
-    (of the body at the new frame). A header such as ``a [mm]`` gives the unit of plain numbers in its column;
-    without one they are SI. A cell may carry its own unit. A driven cell names its joint: ``knee``,
-    ``knee + 90 deg``, ``0.5*knee``. Empty is 0 (or nothing). Lines that start with # are comments.
+    rate, effort`` (of the one joint in the row), ``passive`` (yes/no: that joint has no actuator) and
+    ``mass`` (of the body at the new frame). A header such as ``a [mm]`` gives the unit of plain numbers in
+    its column; without one they are SI. A cell may carry its own unit. A driven cell names its joint:
+    ``knee``, ``knee + 90 deg``, ``0.5*knee``. Empty is 0 (or nothing). Lines that start with # are comments.
 
     Within a chain every row starts ``from`` the frame the row before ends in (``to``); the first starts from
     ``base`` (or ``BY``) or from a frame of an earlier chain. InputError names file, line and column.

@@ -4,6 +4,7 @@ Row: T = Rz(theta) Tz(d) Tx(a) Rx(epsilon). Arc: the rotation vector (0, pitch, 
 length (A, B yaw, -B pitch), see :mod:`bodyplan.spatial.coefficients`.
 """
 
+# ruff: noqa: E741 - l is the lane, everywhere
 from __future__ import annotations
 
 import numpy as np
@@ -17,9 +18,10 @@ from bodyplan.spatial.lanes import inlined, lane_count, load, strip, table, unlo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def forward_kernel(batch: int, q: Array, base: Array, ints: IntArray, floats: Array, out: Array) -> int:
-    """Poses ``out`` (B F 7) of every frame for ``batch`` configurations ``q`` (B n,); ``base`` (B, 7) or (1, 7).
+    """Poses ``out`` (B F 7) of every frame for ``batch`` configurations ``q`` (B n,).
 
-    Returns the index of a block with a non-finite coordinate, or -1.
+    ``base``: (B, 7) or (1, 7) poses of the base. Returns the index of a block with a number that is not
+    finite, or -1.
     """
     L = lane_count(batch)
     B, F, V, n = int(batch), ints[0], ints[1], ints[2]
@@ -51,7 +53,7 @@ def forward_kernel(batch: int, q: Array, base: Array, ints: IntArray, floats: Ar
 
 
 @inlined
-def _row(S: Array, e: int, ints: IntArray, floats: Array, D: Array, wide: bool) -> None:
+def _row(S: Array, e: int, ints: IntArray, floats: Array, D: Array, wide: int) -> None:
     L = lane_count(wide)
     i, f = HEAD + e * ELEMENT_I, e * ELEMENT_F
     parent, theta, d, a, epsilon = ints[i + 1], ints[i + 2], ints[i + 3], ints[i + 4], ints[i + 5]
@@ -79,7 +81,7 @@ def _row(S: Array, e: int, ints: IntArray, floats: Array, D: Array, wide: bool) 
 
 
 @inlined
-def _arc(S: Array, e: int, parent: int, D: Array, length: float, wide: bool) -> None:
+def _arc(S: Array, e: int, parent: int, D: Array, length: float, wide: int) -> None:
     L = lane_count(wide)
     h = D.shape[0] - 1
     for l in range(L):

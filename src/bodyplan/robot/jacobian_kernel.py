@@ -1,10 +1,11 @@
 """Poses and joint twists of target frames, from each target back to the base.
 
-Everything is carried in the axes of the target: M holds the axes x, y, z of the current frame and its origin r,
-seen from the target. A joint's column of paper *legs* eq. (6) then needs no rotation: a turn about an axis w
-through r gives (r x w, w), a slide along u gives (u, 0). At the base, M is the inverse of the target's pose.
+Everything is carried in the axes of the target: M holds the axes x, y, z of the current frame and its origin
+r, seen from the target. A joint's column of paper *legs* eq. (6) then needs no rotation: a turn about an axis
+w through r gives (r x w, w), a slide along u gives (u, 0). At the base, M is the target's pose inverted.
 """
 
+# ruff: noqa: E741 - l is the lane, everywhere
 from __future__ import annotations
 
 import numpy as np
@@ -26,8 +27,8 @@ from bodyplan.robot.values import (
 from bodyplan.spatial.coefficients import slope_coefficients
 from bodyplan.spatial.lanes import fma, inlined, lane_count, load, strip, table, unload
 
-# rows of the flat table W: M, the axes x, y, z and the origin r; an arc's rotation (9), end point (3), E of pitch
-# (6) and of yaw (6)
+# rows of the flat table W: M, the axes x, y, z and the origin r; an arc's rotation (9), end point (3), E of
+# pitch (6) and of yaw (6)
 X, Y, Z, R, ARC_TURN, ARC_END, E_PITCH, E_YAW, WORK = 0, 3, 6, 9, 12, 21, 24, 30, 36
 
 
@@ -56,7 +57,7 @@ def jacobian_kernel(
     steps = offsets + C + 1
     all_q, positions = strip(q, 0, B * n), strip(position, 0, B * C * 3)
     rotations, twists = strip(rotation, 0, B * C * 9), strip(twist, 0, B * K * 6)
-    # drives D, columns T of one target, rotations and positions of all, the rows listed above, a sum, the block's q
+    # drives D, columns T of one target, rotations and positions of all, the rows W listed above, a sum, q
     scratch = np.empty((6 * (V + 1 + most) + 12 * C + WORK + 1 + n) * L)
     at_T, at_turn = 6 * (V + 1) * L, 6 * (V + 1 + most) * L
     at_place, at_W = at_turn + 9 * C * L, at_turn + 12 * C * L
@@ -124,7 +125,7 @@ def jacobian_kernel(
 
 @inlined
 def _revolute(
-    W: Array, D: Array, v: int, scale: float, d: float, a: float, T: Array, column: int, wide: bool
+    W: Array, D: Array, v: int, scale: float, d: float, a: float, T: Array, column: int, wide: int
 ) -> None:
     """The usual row in one sweep: slide by constant d and a, the column of theta, turn by theta."""
     L = lane_count(wide)
@@ -147,7 +148,7 @@ def _revolute(
 
 
 @inlined
-def _turn_fixed(W: Array, i: int, j: int, c: float, s: float, wide: bool) -> None:
+def _turn_fixed(W: Array, i: int, j: int, c: float, s: float, wide: int) -> None:
     """Axes i and j turned back by a constant angle."""
     L = lane_count(wide)
     for l in range(L):
@@ -157,7 +158,7 @@ def _turn_fixed(W: Array, i: int, j: int, c: float, s: float, wide: bool) -> Non
 
 
 @inlined
-def _turn_driven(W: Array, i: int, j: int, D: Array, v: int, wide: bool) -> None:
+def _turn_driven(W: Array, i: int, j: int, D: Array, v: int, wide: int) -> None:
     """Axes i and j turned back by the angle of drive v."""
     L = lane_count(wide)
     for l in range(L):
@@ -168,7 +169,7 @@ def _turn_driven(W: Array, i: int, j: int, D: Array, v: int, wide: bool) -> None
 
 
 @inlined
-def _slide_fixed(W: Array, axis: int, length: float, wide: bool) -> None:
+def _slide_fixed(W: Array, axis: int, length: float, wide: int) -> None:
     L = lane_count(wide)
     for l in range(L):
         for r in range(3):
@@ -176,7 +177,7 @@ def _slide_fixed(W: Array, axis: int, length: float, wide: bool) -> None:
 
 
 @inlined
-def _slide_driven(W: Array, axis: int, D: Array, v: int, wide: bool) -> None:
+def _slide_driven(W: Array, axis: int, D: Array, v: int, wide: int) -> None:
     L = lane_count(wide)
     for l in range(L):
         for r in range(3):
@@ -184,9 +185,7 @@ def _slide_driven(W: Array, axis: int, D: Array, v: int, wide: bool) -> None:
 
 
 @inlined
-def _turn_column(
-    W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool
-) -> None:
+def _turn_column(W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: int) -> None:
     """A turn about an axis through r: (r x w, w), times the slope of its drive."""
     L = lane_count(wide)
     if first:
@@ -205,7 +204,7 @@ def _turn_column(
 
 @inlined
 def _slide_column(
-    W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool
+    W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: int
 ) -> None:
     """A slide along an axis u: (u, 0), times the slope of its drive."""
     L = lane_count(wide)
@@ -217,7 +216,7 @@ def _slide_column(
 
 
 @inlined
-def _arc_rows(D: Array, length: float, W: Array, wide: bool) -> None:
+def _arc_rows(D: Array, length: float, W: Array, wide: int) -> None:
     """Rotation, end point and E of the arc in D's last row (see :func:`bodyplan.robot.rows.arc_matrices`)."""
     L = lane_count(wide)
     h = D.shape[0] - 1
@@ -258,7 +257,7 @@ def _arc_rows(D: Array, length: float, W: Array, wide: bool) -> None:
 
 
 @inlined
-def _arc_column(W: Array, row: int, D: Array, v: int, T: Array, column: int, first: int, wide: bool) -> None:
+def _arc_column(W: Array, row: int, D: Array, v: int, T: Array, column: int, first: int, wide: int) -> None:
     """E of one variable of an arc, carried to the target: (M v + r x M omega, M omega)."""
     L = lane_count(wide)
     if first:
@@ -280,7 +279,7 @@ def _arc_column(W: Array, row: int, D: Array, v: int, T: Array, column: int, fir
 
 
 @inlined
-def _arc_back(W: Array, wide: bool) -> None:
+def _arc_back(W: Array, wide: int) -> None:
     """M from the end of an arc to its start."""
     L = lane_count(wide)
     for l in range(L):
@@ -296,7 +295,7 @@ def _arc_back(W: Array, wide: bool) -> None:
 
 
 @inlined
-def _invert(W: Array, turn: Array, place: Array, c: int, wide: bool) -> None:
+def _invert(W: Array, turn: Array, place: Array, c: int, wide: int) -> None:
     """M, the base seen from the target, -> the target seen from the base: rotation by rows, and position."""
     L = lane_count(wide)
     for l in range(L):
@@ -308,7 +307,7 @@ def _invert(W: Array, turn: Array, place: Array, c: int, wide: bool) -> None:
 
 
 @inlined
-def _to_world(turn: Array, place: Array, c: int, base: Array, first: int, wide: bool) -> None:
+def _to_world(turn: Array, place: Array, c: int, base: Array, first: int, wide: int) -> None:
     """A pose seen from the base -> seen from the world, for bases (B, 7) or (1, 7)."""
     L = lane_count(wide)
     for l in range(L):

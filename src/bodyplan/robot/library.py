@@ -44,8 +44,8 @@ def snake(
     "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...; paper *acm*), "universal" (at every
     joint yaw, then pitch: "yaw1", "pitch1", ...).
 
-    ``radius`` m of the round body (default 0.3 of the mean link length). ``mass`` kg of one link (default: the
-    volume of its capsule at 1000 kg/m^3), at the middle of the link. ``limits`` (low, high) rad, ``rate``
+    ``radius`` m of the round body (default 0.3 of the mean link length). ``mass`` kg of one link (default:
+    the volume of its capsule at 1000 kg/m^3), at the middle of the link. ``limits`` (low, high) rad, ``rate``
     rad/s and ``effort`` N m for every joint. ``friction``: Coulomb coefficient of the belly.
 
     Contacts, one a link and named like it: a straight link is a capsule over its whole length. A bending link

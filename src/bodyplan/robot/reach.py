@@ -21,9 +21,9 @@ class Reach:
     """C target frames at a batch of configurations. Arrays, with any leading batch shape:
 
     * ``positions`` (..., C, 3) m and ``rotations`` (..., C, 3, 3), in the world of the base pose;
-    * ``twists`` (..., K, 6): body-fixed (v, omega) of a target per unit rate of one joint. Target c has the rows
-      ``offsets[c]:offsets[c + 1]``, one for each joint between the base and it in the order of the robot's
-      joints; ``joints`` (K,) is the joint of every row. :meth:`jacobian` is one target's (..., 6, k).
+    * ``twists`` (..., K, 6): body-fixed (v, omega) of a target per unit rate of one joint. Target c has the
+      rows ``offsets[c]:offsets[c + 1]``, one for each joint between the base and it in the order of the
+      robot's joints; ``joints`` (K,) is the joint of every row. :meth:`jacobian` is one target's (..., 6, k).
     """
 
     __slots__ = ("_batch", "_paths", "positions", "rotations", "twists")
@@ -95,11 +95,11 @@ def reach(
     shape, flat, pose = flatten(q, base)
     at = _result(paths, shape, out)
     size, n, rank = math.prod(shape), paths.one[0], len(shape)
-    arrays = tuple(a.reshape(size, *a.shape[rank:]) for a in (at.positions, at.rotations, at.twists))
+    flat_out = [a.reshape(size, *a.shape[rank:]) for a in (at.positions, at.rotations, at.twists)]
 
     def kernel(first: int, last: int) -> int:
         bases = pose if len(pose) < 2 else pose[first:last]
-        parts = (a[first:last] for a in arrays)
+        parts = (a[first:last] for a in flat_out)
         return int(
             jacobian_kernel(last - first, flat[first * n : last * n], bases, paths.ints, paths.floats, *parts)
         )

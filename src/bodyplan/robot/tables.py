@@ -1,8 +1,8 @@
 """A robot's chains as flat number tables: what the kernels read instead of Python objects.
 
 Frame 0 is the base; frame e > 0 is the one that element e ends in, so that a parent always comes first.
-Variables of an element are numbered 0..3: theta, d, a, epsilon of a row; pitch, yaw of an arc. A *drive* is one
-variable of one element that follows a joint.
+Variables of an element are numbered 0..3: theta, d, a, epsilon of a row; pitch, yaw of an arc. A *drive* is
+one variable of one element that follows a joint.
 
 Kernels take all tables of a kind in one flat array with the sizes in front: every array that is passed to a
 compiled function costs a call some 50 ns.
@@ -18,16 +18,18 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray, frozen
 from bodyplan.robot.elements import Arc, Chain, Joint, WheelRadius
 
-# ints: F, V, n, C, S, K, M, then element_i (F, 6), drive_i (V, 3), starts (C + 1), offsets (C + 1), steps (S, 14)
+# ints: F, V, n, C, S, K, M, then the tables element_i (F, 6), drive_i (V, 3), starts (C + 1),
+#       offsets (C + 1), steps (S, 14)
 # floats: element_f (F, 12), drive_f (V, 2)
 HEAD = 7
 # element_i: kind, parent frame, drive of variable 0..3 (-1: constant)
-# element_f: constants 0..3 (an arc has its length in 2), then cosine and sine of theta and of epsilon, then those
-#            of their halves
+# element_f: constants 0..3 (an arc has its length in 2), then cosine and sine of theta and of epsilon, then
+#            those of their halves
 ELEMENT_I, ELEMENT_F = 6, 12
 # drive_i: joint, law, kind of variable;  drive_f: value = f0 + f1 q (LINEAR) or f0 + f1 cos(q/2) (WHEEL)
 DRIVE_I, DRIVE_F = 3, 2
-# step: what to do, element; for each variable its drive, its column (both -1: constant), 1 at a column's first use
+# step: what to do, element; for the variables 0..3 their drives, their columns (both -1: constant), and 1
+#       where this is the first use of the column
 STEP = 14
 
 ROW, ARC = 1, 2
@@ -46,12 +48,12 @@ class Tables(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """The ways from C target frames back to the base in S steps, and the K joint columns they need, at most M for
-    one target. Target c has the steps starts[c]:starts[c + 1] and the columns offsets[c]:offsets[c + 1].
+    """The ways from C target frames back to the base in S steps, and the K joint columns that they need.
 
-    ``ints`` holds the tables as well. ``joints`` (K,): joint of every column, ascending within a target;
-    ``names``: all joints; ``one``: (n,), the shape of one configuration; ``shapes``: those of its results, positions,
-    rotations and twists.
+    Target c has the steps starts[c]:starts[c + 1] and the columns offsets[c]:offsets[c + 1], at most M.
+    ``ints`` holds the tables as well. ``joints`` (K,): joint of every column, ascending within a target.
+    ``names``: all joints. ``one``: (n,), the shape of one configuration. ``shapes``: those of its results,
+    positions, rotations and twists.
     """
 
     ints: IntArray

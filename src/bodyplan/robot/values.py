@@ -1,5 +1,6 @@
-"""First stage of the kinematic kernels: joint coordinates of a block of lanes -> variables of the elements."""
+"""First stage of the kinematic kernels: joint coordinates of a block -> variables of the elements."""
 
+# ruff: noqa: E741 - l is the lane, everywhere
 from __future__ import annotations
 
 import math
@@ -7,7 +8,7 @@ import math
 from numba import njit
 
 from bodyplan.arrays import Array, IntArray
-from bodyplan.robot.tables import DRIVE_F, DRIVE_I, ELEMENT_F, ELEMENT_I, ROW_ANGLE, WHEEL, HEAD
+from bodyplan.robot.tables import DRIVE_F, DRIVE_I, ELEMENT_F, ELEMENT_I, HEAD, ROW_ANGLE, WHEEL
 from bodyplan.spatial.lanes import SINCOS_LIMIT, inlined, lane_count, sincos, sines
 
 # columns of a drive in the table D (V, 6 L): value, d(value)/dq, sine and cosine of an angle
@@ -18,7 +19,7 @@ PITCH, YAW, HALF, SINE_HALF, COSINE_HALF, RATIO = 0, 1, 2, 3, 4, 5
 
 @inlined
 def drive_values(
-    q: Array, ints: IntArray, floats: Array, half: float, D: Array, total: Array, wide: bool
+    q: Array, ints: IntArray, floats: Array, half: float, D: Array, total: Array, wide: int
 ) -> bool:
     """Fill D for a block ``q`` (n, L); sines and cosines are those of ``half`` times an angle. False where a
     coordinate is not finite.
@@ -77,8 +78,8 @@ def _large_values(q: Array, ints: IntArray, floats: Array, half: float, D: Array
 
 
 @inlined
-def bend(p: int, y: int, pitch: float, yaw: float, D: Array, wide: bool) -> None:
-    """Half-angle functions of an arc with drives ``p`` and ``y``, or -1 and the constants, into D's last row."""
+def bend(p: int, y: int, pitch: float, yaw: float, D: Array, wide: int) -> None:
+    """Half-angle functions of an arc with drives ``p``, ``y`` (or -1 and constants), into D's last row."""
     L = lane_count(wide)
     h = D.shape[0] - 1
     for l in range(L):

@@ -6,7 +6,7 @@
     D = (1 - A/(2 B))/x^2
 
 A and B have no cancellation when written with the half angle, B = (sin(x/2)/(x/2))^2 / 2. The closed forms of
-C, D and of dB/dx lose digits near 0: below z = x^2 = 1 their Taylor polynomials are used (truncation < 1e-17).
+C, D and of dB/dx lose digits near 0: below z = x^2 = 1 their Taylor polynomials take over, to 1e-17.
 What takes a ``Number`` works on floats and arrays in Python and on floats inside Numba kernels.
 """
 

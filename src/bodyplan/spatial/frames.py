@@ -2,12 +2,12 @@
 
 Paper *acm* eq. (1), rows e_r, e_p, e_y of the paper being columns of R here:
 
-    e_r' = kappa_y e_p - kappa_p e_y,  e_p' = -kappa_y e_r + tau e_y,  e_y' = kappa_p e_r - tau e_p,  c' = e_r.
+    e_r' = kappa_y e_p - kappa_p e_y,  e_p' = -kappa_y e_r + tau e_y,  e_y' = kappa_p e_r - tau e_p, c' = e_r.
 
 One step of length h is T <- T exp(Omega) with the Magnus expansion of order 6 from the shape at three Gauss
-nodes (Blanes, Casas and Ros, BIT 40 (2000) 434-450), for which brackets change sign here because T stands on
-the left. Every step is a rigid displacement: rotations stay orthonormal, a constant shape (line, arc, helix) is
-exact at any step.
+nodes (Blanes, Casas and Ros, BIT 40 (2000) 434-450), in which brackets change sign here because T stands on
+the left. Every step is a rigid displacement: rotations stay orthonormal, and a constant shape (line, arc,
+helix) is exact at any step.
 """
 
 from __future__ import annotations
@@ -31,8 +31,7 @@ _NODES = np.array(GAUSS_NODES)
 # the six nodes of two half steps: weights that extrapolate their polynomial to the start, and the gap there
 _SIX = np.concatenate([0.5 * _NODES, 0.5 + 0.5 * _NODES])
 TO_START = tuple(
-    float(np.prod([0.0 - x for x in _SIX if x != xi]) / np.prod([xi - x for x in _SIX if x != xi]))
-    for xi in _SIX
+    float(np.prod([0.0 - x for x in _SIX if x != xi]) / np.prod([xi - x for x in _SIX if x != xi])) for xi in _SIX
 )
 OUTER = float(_SIX[0])
 Vector = tuple[float, float, float]
@@ -50,15 +49,15 @@ def curve_frames(
     """Points (S, 3) and frames (S, 3, 3), columns e_r, e_p, e_y, of the curve with a given shape.
 
     ``shape(s)`` -> (S, 3): tau, kappa_p, kappa_y (rad per unit length) at arc lengths ``s`` (S,), vectorised.
-    ``s``: not decreasing. ``start``: pose (7,) at ``s[0]``, position and quaternion wxyz; default the identity.
+    ``s``: not decreasing. ``start``: pose (7,) at ``s[0]``, position and quaternion wxyz; default identity.
 
-    Step rule: every interval of ``s`` is cut into steps no longer than 1/16 of the whole; a step is halved
-    until one step and two half steps differ by no more than 8 times its part of ``tolerance``, in position plus
-    rotation times (1 + whole length), and the two halves are kept. Their own error is about 1/64 of that
-    difference, so every point is within ``tolerance`` (in the unit of s, and rad) with room to spare. A jump of
-    the shape is closed in on until it no longer matters.
+    Step rule: every interval of ``s`` is cut into steps no longer than 1/16 of the whole. A step is halved
+    until one step and two half steps differ by no more than 8 times its part of ``tolerance``, in position
+    plus rotation times (1 + whole length), and the two halves are kept. Their own error is about 1/64 of that
+    difference, so every point is within ``tolerance`` (in the unit of s, and rad) with room to spare. A jump
+    of the shape is closed in on until it no longer matters.
 
-    Raises InputError for a bad argument or a shape that is not finite, SolveError if the steps become too many.
+    Raises InputError for a bad argument or a shape that is not finite, SolveError for too many steps.
     """
     s = finite(s, "s", (None,))
     number(tolerance, "tolerance", at_least=1e-13)
@@ -78,11 +77,11 @@ def curve_frames(
 
 
 def frames_from_nodes(shapes: ArrayLike, steps: ArrayLike, start: ArrayLike | None = None) -> Array:
-    """Poses (..., M + 1, 7) at the ends of M steps from shapes sampled beforehand, no error control: the fast way.
+    """Poses (..., M + 1, 7) at the ends of M steps from shapes sampled beforehand: the fast way.
 
-    ``shapes`` (..., M, 3, 3): tau, kappa_p, kappa_y at the three :data:`GAUSS_NODES` of each step (node before
-    component); ``steps`` (M,) lengths, the same for all curves of the batch; ``start`` (7,) or (..., 7). The error
-    of a step is O(h^7) of the curvatures' variation; constant shapes are exact.
+    ``shapes`` (..., M, 3, 3): tau, kappa_p, kappa_y at the three :data:`GAUSS_NODES` of each step (node
+    before component). ``steps`` (M,): their lengths, the same for all curves of the batch. ``start`` (7,) or
+    (..., 7). No error control: the error of a step is O(h^7) for a smooth shape, none for a constant one.
     """
     u = finite(shapes, "shapes")
     h = finite(steps, "steps", (None,))
@@ -102,9 +101,7 @@ def frames_from_nodes(shapes: ArrayLike, steps: ArrayLike, start: ArrayLike | No
     return poses.reshape(*lead, len(h) + 1, 7)
 
 
-def _adaptive(
-    shape: Callable[[Array], ArrayLike], s: Array, length: float, tolerance: float
-) -> tuple[Array, Array]:
+def _adaptive(shape: Callable[[Array], ArrayLike], s: Array, length: float, tolerance: float) -> tuple[Array, Array]:
     """Ends (N,) of the accepted steps in order, and their displacements (N, 7)."""
     if length == 0.0:
         return np.empty(0), np.empty((0, 7))
@@ -149,7 +146,7 @@ def _first_steps(s: Array, longest: float) -> tuple[Array, Array]:
 
 
 def _displacements(shape: Callable[[Array], ArrayLike], low: Array, high: Array) -> tuple[Array, Array]:
-    """Displacements (M, 7) of single steps from ``low`` to ``high`` (M,), and the shapes (M, 3, 3) they took."""
+    """Displacements (M, 7) of single steps from ``low`` to ``high`` (M,), and the shapes (M, 3, 3) used."""
     h = high - low
     places = (low[:, None] + h[:, None] * _NODES).ravel()
     u = np.array(finite(shape(places), "shape(s)", (len(places), 3))).reshape(len(h), 3, 3)
@@ -168,7 +165,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 @njit(cache=True, nogil=True)
 def _step(u: Array, m: int, h: float, out: Array, k: int) -> None:
-    """Displacement ``out[k]`` (7,) of one step of length ``h`` with shapes ``u[m]`` (3, 3) at its Gauss nodes.
+    """Displacement ``out[k]`` (7,) of one step of length ``h``, shapes ``u[m]`` (3, 3) at its Gauss nodes.
 
     a1 = h X2, a2 = sqrt(15)/3 h (X3 - X1), a3 = 10/3 h (X3 - 2 X2 + X1) with the twists X = (e_x; u):
     C1 = -[a1, a2], C2 = [a1, 2 a3 + C1]/60, Omega = a1 + a3/12 - [-20 a1 - a3 + C1, a2 + C2]/240.
@@ -248,7 +245,7 @@ def accumulate(start: Array, increment: Array, out: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def march(u: Array, h: Array, start: Array, out: Array) -> None:
-    """Poses ``out`` (B (M + 1), 7) of B curves: shapes ``u`` (B M, 3, 3), steps ``h`` (M,), ``start`` (B, 7)."""
+    """Poses ``out`` (B (M + 1), 7) of curves: ``start`` (B, 7), shapes ``u`` (B M, 3, 3), steps ``h``."""
     M = h.shape[0]
     step = np.empty((1, 7))
     for b in range(start.shape[0]):
@@ -260,9 +257,7 @@ def march(u: Array, h: Array, start: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def differences(
-    whole: Array, halves: Array, u: Array, at_ends: Array, h: Array, weight: float, error: Array
-) -> None:
+def differences(whole: Array, halves: Array, u: Array, at_ends: Array, h: Array, weight: float, error: Array) -> None:
     """How far step i (M, 7) is from half steps 2 i and 2 i + 1 (2 M, 7): position + ``weight`` x rotation.
 
     The rotation includes what may hide between the outermost nodes and the ends: there the shape ``at_ends``

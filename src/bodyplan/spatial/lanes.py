@@ -5,13 +5,15 @@ lanes known when it is compiled: LLVM turns such a loop into vector instructions
 calls nothing, so sine and cosine are polynomials here.
 """
 
+# ruff: noqa: E741 - l is the lane, everywhere
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
 from numba.core.errors import NumbaTypeError
 from numba.extending import intrinsic, overload
@@ -27,7 +29,7 @@ SINCOS_LIMIT = 2.0**26
 inlined = njit(nogil=True, forceinline=True, error_model="numpy")
 
 
-def lane_count(wide: Any) -> int:
+def lane_count(wide: int) -> int:
     """Lanes of a block, known at compile time: LANES where ``wide`` is an integer, 1 where it is a bool."""
     raise NotImplementedError("for use inside kernels")
 
@@ -40,14 +42,17 @@ def _lane_count(wide: Any) -> Any:
 
 
 @intrinsic
-def fma(typing: Any, a: Any, b: Any, c: Any) -> Any:
-    """a b + c with one rounding. A hardware instruction on every CPU of the last ten years; asking for it by name
-    gives the same digits everywhere, which a compiler's licence to contract would not."""
+def _fma(typing: Any, a: Any, b: Any, c: Any) -> Any:
 
     def build(context: Any, builder: ir.IRBuilder, signature: Any, args: Any) -> Any:
         return builder.fma(*args)
 
     return types.float64(types.float64, types.float64, types.float64), build
+
+
+#: fma(a, b, c) = a b + c with one rounding. A hardware instruction on every CPU of the last ten years; asking
+#: for it by name gives the same digits everywhere, which a compiler's licence to contract would not.
+fma = cast(Callable[[float, float, float], float], _fma)
 
 
 # pi/2 in two parts (Cody and Waite), and 1.5 2^52: adding it rounds to an integer in the lowest bits
@@ -58,7 +63,8 @@ _ROUND = 6755399441055744.0
 
 @inlined
 def sincos(x: float) -> tuple[float, float]:
-    """(sin x, cos x) for |x| <= SINCOS_LIMIT with an error below 1 ulp of 1, without a branch or a call.
+    """(sin x, cos x) for |x| <= SINCOS_LIMIT without a branch or a call, within 1.5 units in the last place (of
+    1e-9 where the value is smaller).
 
     x = k pi/2 + y with |y| <= pi/4; minimax polynomials of degree 13 and 14 (the coefficients of fdlibm,
     Sun Microsystems 1993); the quadrant k mod 4 swaps and signs them.
@@ -92,7 +98,7 @@ def sincos(x: float) -> tuple[float, float]:
 
 
 @inlined
-def sines(D: Array, row: int, value: int, sine: int, cosine: int, factor: float, wide: Any) -> None:
+def sines(D: Array, row: int, value: int, sine: int, cosine: int, factor: float, wide: int) -> None:
     """Sine and cosine of ``factor`` times the lanes of row ``row`` of D (rows, columns) that start at column
     ``value``, into those that start at columns ``sine`` and ``cosine``."""
     total = 0.0
@@ -120,38 +126,37 @@ def _borrowed(array: Any, dimensions: int) -> tuple[Any, Any]:
         shape = list(args[2:])
         strides = [builder.mul(shape[-1], size), size][-dimensions:]
         data = builder.gep(source.data, [args[1]])
-        arrayobj.populate_array(out, data, shape, strides, size, meminfo=None, parent=None)
+        fill: Any = arrayobj.populate_array
+        fill(out, data, shape, strides, size, meminfo=None, parent=None)
         return out._getvalue()
 
     return result, build
 
 
 @intrinsic
-def table(typing: Any, flat: Any, start: Any, rows: Any, columns: Any) -> Any:
-    """The table (rows, columns) that begins at entry ``start`` of a contiguous array of any shape.
-
-    Not counted as a reference, because counting costs more than a row of lanes: ``flat`` must stay in use, by a
-    later statement, for as long as the table is.
-    """
+def _table(typing: Any, flat: Any, start: Any, rows: Any, columns: Any) -> Any:
     result, build = _borrowed(flat, 2)
     return result(flat, types.intp, types.intp, types.intp), build
 
 
 @intrinsic
-def strip(typing: Any, flat: Any, start: Any, size: Any) -> Any:
-    """The ``size`` entries from ``start`` on of a contiguous array; as :func:`table`."""
+def _strip(typing: Any, flat: Any, start: Any, size: Any) -> Any:
     result, build = _borrowed(flat, 1)
     return result(flat, types.intp, types.intp), build
 
 
+#: table(flat, start, rows, columns): the table that begins at entry ``start`` of a contiguous array of any
+#: shape. Not counted as a reference, because counting costs more than a row of lanes: ``flat`` must stay in
+#: use, by a later statement, for as long as the table is.
+table = cast(Callable[[Array, int, int, int], Array], _table)
+#: strip(flat, start, size): the same for a part of it in one row.
+strip = cast(Callable[[Array, int, int], Array], _strip)
+
+
 @intrinsic
 def _transpose4(typing: Any, source: Any, i: Any, step: Any, target: Any, j: Any, stride: Any) -> Any:
-    """target[j + b stride + a] = source[i + a step + b] for a, b < 4, in vector registers."""
-
     def build(context: Any, builder: ir.IRBuilder, signature: Any, args: Any) -> Any:
-        start = [
-            context.make_array(t)(context, builder, value=args[k]).data for k, t in ((0, source), (3, target))
-        ]
+        start = [context.make_array(t)(context, builder, value=args[k]).data for k, t in ((0, source), (3, target))]
         vector, index = ir.VectorType(ir.DoubleType(), 4), ir.IntType(64)
 
         def at(k: int, n: int) -> Any:
@@ -171,11 +176,14 @@ def _transpose4(typing: Any, source: Any, i: Any, step: Any, target: Any, j: Any
     return types.void(source, types.intp, types.intp, target, types.intp, types.intp), build
 
 
+# transpose4(source, i, step, target, j, stride): target[j + b stride + a] = source[i + a step + b], a, b < 4,
+# through vector registers
+transpose4 = cast(Callable[[Array, int, int, Array, int, int], None], _transpose4)
+
+
 @inlined
-def unload(
-    rows: Array, first: int, count: int, lanes: int, out: Array, start: int, stride: int, wide: Any
-) -> None:
-    """Give every lane its own numbers: out[start + lane stride + k] = rows[first + k L + lane] for k < ``count``.
+def unload(rows: Array, first: int, count: int, lanes: int, out: Array, start: int, stride: int, wide: int) -> None:
+    """Give each lane its own numbers: out[start + lane stride + k] = rows[first + k L + lane], k < ``count``.
 
     Both arrays are flat. A full block goes through registers four by four.
     """
@@ -183,21 +191,21 @@ def unload(
     fours = count - count % 4 if lanes == L and L > 1 else 0
     for k in range(0, fours, 4):
         for l in range(0, L, 4):
-            _transpose4(rows, first + k * L + l, L, out, start + l * stride + k, stride)
+            transpose4(rows, first + k * L + l, L, out, start + l * stride + k, stride)
     for l in range(lanes):
         for k in range(fours, count):
             out[start + l * stride + k] = rows[first + k * L + l]
 
 
 @inlined
-def load(flat: Array, start: int, stride: int, count: int, lanes: int, rows: Array, wide: Any) -> None:
+def load(flat: Array, start: int, stride: int, count: int, lanes: int, rows: Array, wide: int) -> None:
     """The inverse of :func:`unload`: rows[k, lane] = flat[start + lane stride + k]; the last of ``lanes`` is
     repeated to fill the block."""
     L = lane_count(wide)
     fours = count - count % 4 if lanes == L and L > 1 else 0
     for l in range(0, L, 4):
         for k in range(0, fours, 4):
-            _transpose4(flat, start + l * stride + k, stride, rows, k * L + l, L)
+            transpose4(flat, start + l * stride + k, stride, rows, k * L + l, L)
     for l in range(L):
         for k in range(fours, count):
             rows[k, l] = flat[start + min(l, lanes - 1) * stride + k]

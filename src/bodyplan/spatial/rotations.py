@@ -44,7 +44,7 @@ def multiply(p: ArrayLike, q: ArrayLike) -> Array:
 
 def conjugate(q: ArrayLike) -> Array:
     """The inverse rotation of unit quaternions (..., 4)."""
-    return np.asarray(q, dtype=np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.multiply(q, (1.0, -1.0, -1.0, -1.0))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> Array:

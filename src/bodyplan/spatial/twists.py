@@ -32,15 +32,15 @@ def log(pose: ArrayLike) -> Array:
 
 
 def adjoint(position: ArrayLike, rotation: ArrayLike) -> Array:
-    """Ad (..., 6, 6) = [R, [p] R; 0, R] of a frame at ``position`` (..., 3) with ``rotation`` (..., 3, 3): the
-    twist of a rigid body in this frame, told in the frame it is seen from."""
+    """Ad (..., 6, 6) = [R, [p] R; 0, R] of a frame at ``position`` (..., 3) with ``rotation`` (..., 3, 3):
+    from the twist of a rigid body in this frame to its twist in the frame that this one is seen from."""
     R = np.asarray(rotation, dtype=np.float64)
     return _blocks(R, hat(position) @ R)
 
 
 def adjoint_inverse(position: ArrayLike, rotation: ArrayLike) -> Array:
-    """Ad^-1 (..., 6, 6) = [R^T, -R^T [p]; 0, R^T]: from the twist of a frame to that of one rigidly attached to it
-    at ``position`` (..., 3) with ``rotation`` (..., 3, 3)."""
+    """Ad^-1 (..., 6, 6) = [R^T, -R^T [p]; 0, R^T]: from the twist of a frame to that of one rigidly attached
+    to it at ``position`` (..., 3) with ``rotation`` (..., 3, 3)."""
     Rt = np.swapaxes(np.asarray(rotation, dtype=np.float64), -1, -2)
     return _blocks(Rt, -Rt @ hat(position))
 
