@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,14 @@ import numpy as np
 import bodyplan as bp
 from bodyplan.check import check
 from bodyplan.show.outcome import Comparison, Outcome, Variant
+from bodyplan.show.report import write_report
 from bodyplan.simulate.trial import Slip, Trial
 
 #: m that the trial made by hand falls behind its plan in each cycle, evenly
 LOST = 0.05
 CYCLES, START, DT = 2, 1.0, 0.02
+#: a text that would do harm if it were taken for HTML
+EVIL = "<script>document.documentElement.dataset.problems='hacked'</script><img src=x onerror=alert(1)>"
 
 
 @lru_cache
@@ -142,6 +146,14 @@ def full_outcome(**changes: Any) -> Outcome:
         Comparison("lost", "Lost", None, None, None, 1.0, None, None, "diverged"),
     )
     return outcome(snake_trial(), others=others, variants=(Variant.of("linear", snake_motion()),), **changes)
+
+
+@lru_cache
+def evil_report(scratch: Path) -> Path:
+    """The whole report of the small snake under a hostile title, written once into a folder in ``scratch``."""
+    folder = scratch / "evil-report"
+    folder.mkdir()
+    return write_report(full_outcome(title=f"Mine {EVIL}"), folder)
 
 
 def motion_of(robot: bp.Robot, ground: Any, t: Any, base: Any, q: Any, **more: Any) -> bp.Motion:

@@ -85,9 +85,7 @@ def test_the_playback_repeats_the_plan_and_follows_the_trial() -> None:
     for cycle in range(CYCLES + 1):
         i = int(np.abs(playback.t - cycle * period).argmin())
         assert playback.t[i] == pytest.approx(cycle * period, abs=1e-12)
-        np.testing.assert_allclose(
-            playback.planned[i, :, :3] - first[:, :3], [[cycle * advance, 0, 0]] * 9, atol=1e-12
-        )
+        np.testing.assert_allclose(playback.planned[i, :, :3] - first[:, :3], [[cycle * advance, 0, 0]] * 9, atol=1e-12)
     assert playback.executed is not None and playback.executed.shape == playback.planned.shape
     records = motion.robot.forward(trial.q, trial.base).array
     at = np.searchsorted(trial.t, playback.t + START - 1e-9)
@@ -296,9 +294,7 @@ def test_gaps_of_the_five_point_formula() -> None:
     t = np.linspace(0.0, 1.0, 21)[:, None]
     robot = bp.snake(2, 0.1)
     base = np.tile([0.0, 0, 0, 1, 0, 0, 0], (21, 1))
-    cubic = bp.Motion(
-        robot, bp.Plane(), {}, t[:, 0], base, t**3, 3 * t**2, 6 * t, np.zeros(21), np.full(21, "ok")
-    )
+    cubic = bp.Motion(robot, bp.Plane(), {}, t[:, 0], base, t**3, 3 * t**2, 6 * t, np.zeros(21), np.full(21, "ok"))
     gaps = five_point_gaps(cubic)
     assert set(gaps) == {"rate_gap_rms", "rate_gap_max", "acceleration_gap_rms", "acceleration_gap_max"}
     assert max(gaps.values()) < 1e-11
