@@ -196,10 +196,10 @@ def test_the_servo_of_a_shared_joint_reads_and_drives_the_joint_coordinate() -> 
     assert torque == pytest.approx(1.0, rel=1e-9) == data.actuator_force[0]
 
 
-def test_default_servo_is_the_weight_times_the_length() -> None:
+def test_default_servo_is_twice_the_weight_times_the_length() -> None:
     robot = snake(10, 0.1, radius=0.02, mass=0.2)
     gains = default_servo(robot)
-    assert gains["yaw3"] == pytest.approx((2.0 * 9.81 * 1.0, 2.0 * 9.81 / 50.0))
+    assert gains["yaw3"] == pytest.approx((2.0 * 2.0 * 9.81 * 1.0, 2.0 * 2.0 * 9.81 / 50.0))
     assert set(gains) == set(robot.joints)
 
 
