@@ -56,7 +56,7 @@ def test_error_is_within_the_tolerance(reference, tolerance: float) -> None:
 
 
 def test_order_six(reference) -> None:
-    s, points, _ = reference
+    _, points, _ = reference
     errors = []
     for steps in (40, 80):
         u, h = sampled(twisted, 5.0, steps)

@@ -46,9 +46,7 @@ def assemble(
         if contact.frame not in frames | ends:
             raise UnknownNameError("frame", contact.frame, frames, where=f"Contact({contact.name!r}).frame")
         if contact.frame not in frames:
-            raise InputError(
-                f"Contact({contact.name!r}).frame: {contact.frame!r} is a chain; name one of its frames."
-            )
+            raise InputError(f"Contact({contact.name!r}).frame: {contact.frame!r} is a chain; name one of its frames.")
     joints = dict(joint_properties(chains))
     for name in _wheel_joints(chains):
         # the default of WheelRadius, now that nothing else can say otherwise
@@ -69,9 +67,7 @@ def declare(chains: tuple[Chain, ...], joints: Sequence[Joint | str]) -> tuple[C
         if not isinstance(joint, Joint):
             raise InputError(f"joints: expected a Joint or a name, got {item!r}.")
         if (joint.offset, joint.scale) != (0.0, 1.0):
-            raise InputError(
-                f"joints: {joint.name!r} is declared with an offset or a scale; those belong to a row."
-            )
+            raise InputError(f"joints: {joint.name!r} is declared with an offset or a scale; those belong to a row.")
         if joint.name in declared:
             raise InputError(f"joints: {joint.name!r} is declared twice.")
         declared[joint.name] = joint
@@ -81,9 +77,7 @@ def declare(chains: tuple[Chain, ...], joints: Sequence[Joint | str]) -> tuple[C
             raise UnknownNameError("joint", name, declared, where="rows")
     for name in declared:
         if name not in used:
-            raise InputError(
-                f"joints: {name!r} drives nothing; joints that do: {', '.join(used) or '(none)'}."
-            )
+            raise InputError(f"joints: {name!r} drives nothing; joints that do: {', '.join(used) or '(none)'}.")
     # a plain name declares the joint and says nothing else about it
     told = {j.name: j for j in joints if isinstance(j, Joint)}
     for name, joint in told.items():
@@ -95,9 +89,7 @@ def declare(chains: tuple[Chain, ...], joints: Sequence[Joint | str]) -> tuple[C
         name: replace(
             told[name],
             **{
-                prop: getattr(told[name], prop)
-                if getattr(told[name], prop) is not None
-                else getattr(joint, prop)
+                prop: getattr(told[name], prop) if getattr(told[name], prop) is not None else getattr(joint, prop)
                 for prop in ("limits", "rate", "effort")
             },
             actuated=told[name].actuated and joint.actuated,
@@ -135,16 +127,13 @@ def _check_names(chains: tuple[Chain, ...]) -> None:
                 "frame",
                 chain.parent,
                 frames,
-                where=f"chain {chain.name!r}.parent (chains must "
-                "start at the base or at a frame of an earlier chain)",
+                where=f"chain {chain.name!r}.parent (chains must start at the base or at a frame of an earlier chain)",
             )
         last = len(chain.elements) - 1
         for i in range(len(chain.elements)):
             frame = chain.frame_name(i)
             if frame in RESERVED:
-                raise InputError(
-                    f"chain {chain.name!r}, element {i + 1}: the frame name {frame!r} is reserved."
-                )
+                raise InputError(f"chain {chain.name!r}, element {i + 1}: the frame name {frame!r} is reserved.")
             if frame in frames:
                 raise InputError(f"chain {chain.name!r}, element {i + 1}: a frame {frame!r} exists already.")
             frames.add(frame)
@@ -173,13 +162,9 @@ def _with_properties(chains: tuple[Chain, ...], joints: Mapping[str, Joint]) -> 
             return replace(drive, joint=joint)
         return replace(joint, offset=drive.offset, scale=drive.scale)
 
-    return tuple(
-        replace(chain, elements=tuple(_mapped(e, known) for e in chain.elements)) for chain in chains
-    )
+    return tuple(replace(chain, elements=tuple(_mapped(e, known) for e in chain.elements)) for chain in chains)
 
 
 def _mapped(element: Any, change: Callable[[Drive], Drive]) -> Any:
-    changes = {
-        f: change(v) for f in element.VARIABLES if isinstance(v := getattr(element, f), (Joint, WheelRadius))
-    }
+    changes = {f: change(v) for f in element.VARIABLES if isinstance(v := getattr(element, f), (Joint, WheelRadius))}
     return replace(element, **changes) if changes else element

@@ -40,9 +40,7 @@ def joint_array(
     known = kernel_checks and type(q) is np.ndarray and q.dtype is FLOAT
     out: Array = q if known else finite(q, "q")  # type: ignore[assignment]
     if out.ndim == 0 or out.shape[-1] != len(joints):
-        raise InputError(
-            f"q: expected shape (..., {len(joints)}), one column for each joint, got {out.shape}."
-        )
+        raise InputError(f"q: expected shape (..., {len(joints)}), one column for each joint, got {out.shape}.")
     return out
 
 

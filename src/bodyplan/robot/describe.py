@@ -16,9 +16,7 @@ from bodyplan.robot.elements import Arc, Body, Chain, Contact, Element, Joint, R
 Parts = tuple[str, tuple[Chain, ...], tuple[Contact, ...], Body | None]
 
 # dimension of the numbers in a body or a contact; the others are taken in SI as they are
-_DIMENSIONS = {"mass": "mass", "friction": "none"} | dict.fromkeys(
-    ("com", "start", "end", "half", "radius"), "length"
-)
+_DIMENSIONS = {"mass": "mass", "friction": "none"} | dict.fromkeys(("com", "start", "end", "half", "radius"), "length")
 RATES = {"angle": "angular_rate", "length": "speed"}
 EFFORTS = {"angle": "torque", "length": "force"}
 
@@ -57,16 +55,13 @@ def robot_from_dict(data: Any) -> Parts:
     Raises InputError naming the entry, such as ``chains[2].elements[0].theta``, that is wrong.
     """
     known = _table(data, "robot", ("name", "joints", "chains", "contacts", "base_body"))
-    chains = tuple(
-        _chain(item, f"chains[{i}]") for i, item in enumerate(_items(known.get("chains"), "chains"))
-    )
+    chains = tuple(_chain(item, f"chains[{i}]") for i, item in enumerate(_items(known.get("chains"), "chains")))
     if "joints" in known:
         kinds = joint_kinds(chains)
         items = _items(known["joints"], "joints")
         chains = declare(chains, [_joint(item, f"joints[{i}]", kinds) for i, item in enumerate(items)])
     contacts = tuple(
-        _made(Contact, item, f"contacts[{i}]")
-        for i, item in enumerate(_items(known.get("contacts", []), "contacts"))
+        _made(Contact, item, f"contacts[{i}]") for i, item in enumerate(_items(known.get("contacts", []), "contacts"))
     )
     base = known.get("base_body")
     return (
@@ -154,9 +149,7 @@ def _joint(data: Any, where: str, kinds: Mapping[str, str]) -> Joint | str:
     known = dict(_table(data, where, ("name", "limits", "rate", "effort", "actuated")))
     kind = kinds.get(known.get("name", ""), "angle")
     if "limits" in known:
-        known["limits"] = tuple(
-            _limit(v, kind, f"{where}.limits") for v in _items(known["limits"], f"{where}.limits")
-        )
+        known["limits"] = tuple(_limit(v, kind, f"{where}.limits") for v in _items(known["limits"], f"{where}.limits"))
     for field, dimension in (("rate", RATES[kind]), ("effort", EFFORTS[kind])):
         if field in known:
             known[field] = quantity(known[field], dimension, f"{where}.{field}")
@@ -188,9 +181,7 @@ def _build(make: type[Any], known: Mapping[str, Any], where: str) -> Any:
         with located(where):
             return make(**known)
     except TypeError as error:
-        missing = [
-            field.name for field in fields(make) if field.name not in known and field.default is MISSING
-        ]
+        missing = [field.name for field in fields(make) if field.name not in known and field.default is MISSING]
         raise InputError(f"{where}: {make.__name__} needs {', '.join(missing) or 'other fields'}.") from error
 
 

@@ -48,9 +48,7 @@ def write_toml(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
                 lines += ["", f"[[{key}]]"]
                 for k, v in item.items():
                     nested = isinstance(v, list) and v and isinstance(v[0], dict)
-                    text = (
-                        "[\n" + "".join(f"  {_toml(entry)},\n" for entry in v) + "]" if nested else _toml(v)
-                    )
+                    text = "[\n" + "".join(f"  {_toml(entry)},\n" for entry in v) + "]" if nested else _toml(v)
                     lines.append(f"{k} = {text}")
     target = Path(path)
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
@@ -123,9 +121,7 @@ def read_table(path: str | os.PathLike[str]) -> tuple[str, tuple[Chain, ...]]:
     if not rows:
         raise InputError(f"{path}: the table has no rows.")
     with located(str(path)):
-        return Path(path).stem, tuple(
-            Chain(name, tuple(items), parents[name]) for name, items in rows.items()
-        )
+        return Path(path).stem, tuple(Chain(name, tuple(items), parents[name]) for name, items in rows.items())
 
 
 def _row(cell: Mapping[str, str], units: Mapping[str, str | None], name: str, where: str) -> Row:

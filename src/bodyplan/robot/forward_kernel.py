@@ -91,16 +91,10 @@ def _arc(S: Array, e: int, parent: int, D: Array, length: float, wide: int) -> N
         b = 0.5 * ratio * ratio
         u, v, r = length * ratio * c, length * b * yaw, -length * b * pitch
         S[e, l] = (
-            S[parent, l]
-            + u * (1.0 - 2.0 * (y * y + z * z))
-            + 2.0 * v * (x * y - w * z)
-            + 2.0 * r * (x * z + w * y)
+            S[parent, l] + u * (1.0 - 2.0 * (y * y + z * z)) + 2.0 * v * (x * y - w * z) + 2.0 * r * (x * z + w * y)
         )
         S[e, L + l] = (
-            S[parent, L + l]
-            + 2.0 * u * (x * y + w * z)
-            + v * (1.0 - 2.0 * (x * x + z * z))
-            + 2.0 * r * (y * z - w * x)
+            S[parent, L + l] + 2.0 * u * (x * y + w * z) + v * (1.0 - 2.0 * (x * x + z * z)) + 2.0 * r * (y * z - w * x)
         )
         S[e, 2 * L + l] = (
             S[parent, 2 * L + l]

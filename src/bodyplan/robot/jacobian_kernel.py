@@ -124,9 +124,7 @@ def jacobian_kernel(
 
 
 @inlined
-def _revolute(
-    W: Array, D: Array, v: int, scale: float, d: float, a: float, T: Array, column: int, wide: int
-) -> None:
+def _revolute(W: Array, D: Array, v: int, scale: float, d: float, a: float, T: Array, column: int, wide: int) -> None:
     """The usual row in one sweep: slide by constant d and a, the column of theta, turn by theta."""
     L = lane_count(wide)
     for l in range(L):
@@ -203,9 +201,7 @@ def _turn_column(W: Array, axis: int, D: Array, v: int, T: Array, column: int, f
 
 
 @inlined
-def _slide_column(
-    W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: int
-) -> None:
+def _slide_column(W: Array, axis: int, D: Array, v: int, T: Array, column: int, first: int, wide: int) -> None:
     """A slide along an axis u: (u, 0), times the slope of its drive."""
     L = lane_count(wide)
     if first:
@@ -322,9 +318,7 @@ def _to_world(turn: Array, place: Array, c: int, base: Array, first: int, wide: 
 
 
 @inlined
-def _rotated(
-    w: float, x: float, y: float, z: float, v0: float, v1: float, v2: float
-) -> tuple[float, float, float]:
+def _rotated(w: float, x: float, y: float, z: float, v0: float, v1: float, v2: float) -> tuple[float, float, float]:
     """v turned by a unit quaternion: v + w t + n x t with t = 2 n x v."""
     t0, t1, t2 = 2.0 * (y * v2 - z * v1), 2.0 * (z * v0 - x * v2), 2.0 * (x * v1 - y * v0)
     return v0 + w * t0 + y * t2 - z * t1, v1 + w * t1 + z * t0 - x * t2, v2 + w * t2 + x * t1 - y * t0

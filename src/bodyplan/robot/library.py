@@ -85,9 +85,7 @@ def _bends(i: int, axes: str, info: dict[str, Any]) -> dict[str, Joint]:
     return {axis: Joint(f"{axis}{i}", **info) for axis, there in joints.items() if there}
 
 
-def _straight(
-    i: int, length: float, axes: str, info: dict[str, Any], frame: str, body: Body
-) -> list[Element]:
+def _straight(i: int, length: float, axes: str, info: dict[str, Any], frame: str, body: Body) -> list[Element]:
     """Rows of the link behind joint ``i`` (0: the first link, which has none)."""
     bends = _bends(i, axes, info) if i else {}
     quarter = 0.5 * np.pi
@@ -105,9 +103,7 @@ def _lengths(link_length: ArrayLike, count: int) -> Any:
     if lengths.ndim == 0:
         lengths = np.full(count, float(lengths))
     if lengths.shape != (count,):
-        raise InputError(
-            f"link_length: expected one number or {count}, one a link, got shape {lengths.shape}."
-        )
+        raise InputError(f"link_length: expected one number or {count}, one a link, got shape {lengths.shape}.")
     if np.any(lengths <= 0.0):
         raise InputError(f"link_length: must be > 0, got {float(lengths.min())}.")
     return lengths

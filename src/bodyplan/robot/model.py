@@ -81,7 +81,8 @@ class Robot:
             if chain not in rows:
                 raise UnknownNameError("chain", chain, rows, where="parents")
         chains = tuple(
-            Chain(chain, tuple(items), parents.get(chain, "base")) for chain, items in rows.items()
+            Chain(chain, items, parents.get(chain, "base"))  # type: ignore[arg-type]  # Chain makes the tuple
+            for chain, items in rows.items()
         )
         if joints is not None:
             chains = declare(chains, joints)
@@ -211,9 +212,7 @@ class Robot:
         at = self.ends_and_jacobians(q)
         return at.carried(), at.stacked()
 
-    def jacobian(
-        self, q: ArrayLike | Mapping[str, ArrayLike], frame: str, *, reference: str = "body"
-    ) -> Array:
+    def jacobian(self, q: ArrayLike | Mapping[str, ArrayLike], frame: str, *, reference: str = "body") -> Array:
         """(..., 6, n) twist (v, omega) of ``frame`` per unit joint rate, for a base at rest.
 
         ``reference``: "body", in the axes of the frame (the rows of Q); "world", the same twist in the axes
@@ -292,7 +291,9 @@ class Robot:
     def from_toml(cls, path: str | os.PathLike[str]) -> Robot:
         """The robot in a TOML file: fields as in :meth:`to_dict`; numbers may carry units ("240 mm") and
         variables may be drives as text ("knee + 90 deg"). InputError names the file and the entry."""
-        return cls(*files.read_toml(path))
+        parts = files.read_toml(path)
+        with located(str(path)):
+            return cls(*parts)
 
     def to_toml(self, path: str | os.PathLike[str]) -> None:
         """Write the robot as TOML; :meth:`from_toml` gives an equal robot back."""

@@ -79,12 +79,7 @@ def reach(
         # Nothing to convert. One vector, as in a control loop, has a kernel of its own.
         if q.shape == paths.one:
             at = _result(paths, (), out)
-            if (
-                jacobian_kernel(
-                    True, q, NO_POSE, paths.ints, paths.floats, at.positions, at.rotations, at.twists
-                )
-                < 0
-            ):
+            if jacobian_kernel(True, q, NO_POSE, paths.ints, paths.floats, at.positions, at.rotations, at.twists) < 0:
                 return at
         elif q.ndim == 2 and q.shape[1:] == paths.one and len(q) < SHARED_FROM:
             at = _result(paths, q.shape[:1], out)
@@ -100,9 +95,7 @@ def reach(
     def kernel(first: int, last: int) -> int:
         bases = pose if len(pose) < 2 else pose[first:last]
         parts = (a[first:last] for a in flat_out)
-        return int(
-            jacobian_kernel(last - first, flat[first * n : last * n], bases, paths.ints, paths.floats, *parts)
-        )
+        return int(jacobian_kernel(last - first, flat[first * n : last * n], bases, paths.ints, paths.floats, *parts))
 
     run(q, size, kernel)
     return at

@@ -18,9 +18,7 @@ PITCH, YAW, HALF, SINE_HALF, COSINE_HALF, RATIO = 0, 1, 2, 3, 4, 5
 
 
 @inlined
-def drive_values(
-    q: Array, ints: IntArray, floats: Array, half: float, D: Array, total: Array, wide: int
-) -> bool:
+def drive_values(q: Array, ints: IntArray, floats: Array, half: float, D: Array, total: Array, wide: int) -> bool:
     """Fill D for a block ``q`` (n, L); sines and cosines are those of ``half`` times an angle. False where a
     coordinate is not finite.
 
