@@ -75,6 +75,12 @@ def test_scales_on_the_flat():
     assert wave.advance_ratio >= 0.90
 
 
+def test_two_waves_on_scales_are_faster_than_the_warped_mirror_at_equal_joint_rate():
+    mirror = trial({"contraction": "mirror", "max_joint_rate": 0.6}, bp.Plane(), None, SCALES)
+    waves = trial({"extension": 0.35, "waves": 2, "max_joint_rate": 0.6}, bp.Plane(), None, SCALES)
+    assert waves.speed >= 1.8 * mirror.speed
+
+
 def test_scales_that_hold_sideways_favour_the_mirror():
     literal = trial({"contraction": "literal"}, bp.Plane(), (5.0, 0.1), GRIPPING_SCALES)
     mirror = trial({"contraction": "mirror"}, bp.Plane(), (5.0, 0.1), GRIPPING_SCALES)

@@ -18,6 +18,7 @@ from bodyplan.simulate.measure import cost_of_transport, planned_advance, progre
 from bodyplan.simulate.model import Physics, Servo, build
 from bodyplan.simulate.reference import Reference, region
 from bodyplan.simulate.start import Walls, on_the_floor
+from bodyplan.simulate.terrain import CONTACT_STEPS
 from bodyplan.simulate.trial import Trial
 
 #: most time steps of one run: a mistyped dt should not eat the machine
@@ -146,6 +147,7 @@ def _settings(physics: Physics, timing: Timing, floor: float | Friction | None, 
         "friction": floor.to_dict() if isinstance(floor, Friction) else floor,
         "servo": same if all(pair == same for pair in gains.values()) else gains,
         "dt": timing.dt,
+        "contact_time": CONTACT_STEPS * timing.dt,
         "settle": timing.settle,
         "ramp": timing.ramp,
         "record_dt": timing.every * timing.dt,

@@ -14,8 +14,8 @@ from bodyplan.simulate.library import mujoco
 from bodyplan.spatial.rotations import rotate
 
 #: time constant of a contact in time steps. MuJoCo's default of 20 ms lets loaded contacts creep along the ground, by
-#: a tenth and more of a snake's advance; 4 steps are as stiff as stays smooth
-CONTACT_STEPS = 4.0
+#: a tenth and more of a snake's advance; 6 steps are stiff and still smooth
+CONTACT_STEPS = 6.0
 #: thickness under the lowest point of a height field, m
 FIELD_BASE = 0.5
 FLOOR_RGBA, WALL_RGBA = (0.62, 0.66, 0.70, 1.0), (0.45, 0.55, 0.65, 0.35)
