@@ -12,7 +12,6 @@ What takes a ``Number`` works on floats and arrays in Python and on floats insid
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -26,8 +25,10 @@ Number = TypeVar("Number", float, Array)
 #: the Taylor polynomials hold for z = x^2 below this
 SERIES_BELOW = 1.0
 
+_jitable = register_jitable(forceinline=True, error_model="numpy")
 
-@register_jitable
+
+@_jitable
 def c_series(z: Number) -> Number:
     """C for z = x^2 < 1: the sum of (-z)^k/(2k + 3)!, k = 0, 1, ..."""
     p = 1.0 - z * (1.0 / 210.0) * (1.0 - z * (1.0 / 272.0))
@@ -35,7 +36,7 @@ def c_series(z: Number) -> Number:
     return (1.0 / 6.0) * (1.0 - z * (1.0 / 20.0) * (1.0 - z * (1.0 / 42.0) * p))
 
 
-@register_jitable
+@_jitable
 def b_slope_series(z: Number) -> Number:
     """dB/dx / x = (A - 2 B)/x^2 for z = x^2 < 1: the sum of 2 (-1)^(k+1) (k+1) z^k/(2k + 4)!."""
     p = 1.0 - z * (7.0 / 1440.0) * (1.0 - z * (4.0 / 1071.0))
@@ -43,24 +44,12 @@ def b_slope_series(z: Number) -> Number:
     return (-1.0 / 12.0) * (1.0 - z * (1.0 / 15.0) * (1.0 - z * (3.0 / 112.0) * p))
 
 
-@register_jitable
-def exponential(z: float) -> tuple[float, float, float, float]:
-    """(cos(x/2), sin(x/2)/x, A, B) at x = sqrt(z): what a unit quaternion and an arc need."""
-    h = 0.5 * math.sqrt(z)
-    cosine = math.cos(h)
-    # below 1e-150 squares underflow; there sin(h)/h is 1 to the last digit
-    ratio = math.sin(h) / h if h > 1e-150 else 1.0
-    return cosine, 0.5 * ratio, ratio * cosine, 0.5 * ratio * ratio
-
-
-@register_jitable
+@_jitable
 def slope_coefficients(z: float, a: float, b: float) -> tuple[float, float, float]:
     """(C, dA/dx / x, dB/dx / x) at x = sqrt(z), given A and B."""
-    if z < SERIES_BELOW:
-        c, b1 = c_series(z), b_slope_series(z)
-    else:
-        c, b1 = (1.0 - a) / z, (a - 2.0 * b) / z
-    return c, c - b, b1
+    small = z < SERIES_BELOW
+    c = c_series(z) if small else (1.0 - a) / z
+    return c, c - b, b_slope_series(z) if small else (a - 2.0 * b) / z
 
 
 def sinc(x: Array) -> Array:

@@ -10,6 +10,7 @@ the left. Every step is a rigid displacement: rotations stay orthonormal, and a 
 helix) is exact at any step.
 """
 
+# ruff: noqa: E741 - l is the lane, everywhere
 from __future__ import annotations
 
 import math
@@ -21,7 +22,8 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, number
 from bodyplan.errors import InputError, SolveError, Status
-from bodyplan.spatial.coefficients import exponential, slope_coefficients
+from bodyplan.spatial.coefficients import slope_coefficients
+from bodyplan.spatial.lanes import LANES, inlined, load, sines, strip, table, unload
 from bodyplan.spatial.poses import IDENTITY
 from bodyplan.spatial.rotations import matrix_from_quaternion
 
@@ -94,7 +96,7 @@ def frames_from_nodes(shapes: ArrayLike, steps: ArrayLike, start: ArrayLike | No
     if np.any(np.abs(np.linalg.norm(first[..., 3:], axis=-1) - 1.0) > 1e-9):
         raise InputError("start: quaternions (w, x, y, z) must have length 1.")
     size = int(np.prod(lead, dtype=np.int64))
-    flat = np.array(u.reshape(size * len(h), 3, 3), order="C")
+    flat = np.array(u.reshape(size * len(h) * 3, 3), order="C")
     poses = np.empty((size * (len(h) + 1), 7))
     begin = np.array(np.broadcast_to(first, (*lead, 7)).reshape(size, 7))
     march(flat, np.array(h), begin, poses)
@@ -106,18 +108,17 @@ def _adaptive(shape: Callable[[Array], ArrayLike], s: Array, length: float, tole
     if length == 0.0:
         return np.empty(0), np.empty((0, 7))
     low, high = _first_steps(s, length / FIRST_STEPS)
-    whole, _ = _displacements(shape, low, high)
+    whole, _, _ = _displacements(shape, low, high, low[:0])
     done: list[tuple[Array, Array]] = []
     steps = len(low)
     while len(low):
         middle = low + 0.5 * (high - low)
         middle = np.where(low < middle, middle, high)
         starts, ends = np.stack([low, middle], 1), np.stack([middle, high], 1)
-        halves, u = _displacements(shape, starts.ravel(), ends.ravel())
-        # a jump of the shape nearer to an end than the outermost node shows there only
-        at_ends = finite(shape(np.concatenate([low, high])), "shape(s)").reshape(2, len(low), 3)
+        # a jump of the shape nearer to an end than the outermost node shows only at the end
+        halves, u, at_ends = _displacements(shape, starts.ravel(), ends.ravel(), np.concatenate([low, high]))
         error = np.empty(len(low))
-        differences(whole, halves, u.reshape(-1, 6, 3), at_ends, high - low, 1.0 + length, error)
+        differences(whole, halves, u, at_ends, high - low, 1.0 + length, error)
         # 8: the halves are some 64 times better than the difference. The first floor lets a jump be passed (a
         # hundred of them use up the tolerance), the second is rounding.
         share = np.maximum(8.0 * tolerance * np.maximum((high - low) / length, 1e-3), 2e-15 * (1.0 + length))
@@ -145,42 +146,45 @@ def _first_steps(s: Array, longest: float) -> tuple[Array, Array]:
     return low, high
 
 
-def _displacements(shape: Callable[[Array], ArrayLike], low: Array, high: Array) -> tuple[Array, Array]:
-    """Displacements (M, 7) of single steps from ``low`` to ``high`` (M,), and the shapes (M, 3, 3) used."""
+def _displacements(
+    shape: Callable[[Array], ArrayLike], low: Array, high: Array, also: Array
+) -> tuple[Array, Array, Array]:
+    """Displacements (M, 7) of single steps from ``low`` to ``high`` (M,), the shapes (M, 3, 3) at their nodes, and
+    those (..., 3) at the places ``also``."""
     h = high - low
-    places = (low[:, None] + h[:, None] * _NODES).ravel()
-    u = np.array(finite(shape(places), "shape(s)", (len(places), 3))).reshape(len(h), 3, 3)
+    places = np.concatenate([(low[:, None] + h[:, None] * _NODES).ravel(), also])
+    values = np.array(finite(shape(places), "shape(s)", (len(places), 3)))
+    nodes = 3 * len(h)
     out = np.empty((len(h), 7))
-    increments(u, h, out)
-    return out, u
+    increments(values, 0, h, out)
+    return out, values[:nodes], values[nodes:]
 
 
 # --- kernels ------------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, nogil=True)
+@inlined
 def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, nogil=True)
-def _step(u: Array, m: int, h: float, out: Array, k: int) -> None:
-    """Displacement ``out[k]`` (7,) of one step of length ``h``, shapes ``u[m]`` (3, 3) at its Gauss nodes.
+@inlined
+def _magnus(h: float, u1: Vector, u2: Vector, u3: Vector) -> tuple[Vector, Vector]:
+    """Omega = (v, w) of one step of length ``h`` from the shapes at its three Gauss nodes.
 
     a1 = h X2, a2 = sqrt(15)/3 h (X3 - X1), a3 = 10/3 h (X3 - 2 X2 + X1) with the twists X = (e_x; u):
     C1 = -[a1, a2], C2 = [a1, 2 a3 + C1]/60, Omega = a1 + a3/12 - [-20 a1 - a3 + C1, a2 + C2]/240.
     """
     r2, r3 = h * math.sqrt(15.0) / 3.0, h * 10.0 / 3.0
-    w1 = (h * u[m, 1, 0], h * u[m, 1, 1], h * u[m, 1, 2])
-    w2 = (r2 * (u[m, 2, 0] - u[m, 0, 0]), r2 * (u[m, 2, 1] - u[m, 0, 1]), r2 * (u[m, 2, 2] - u[m, 0, 2]))
+    w1 = (h * u2[0], h * u2[1], h * u2[2])
+    w2 = (r2 * (u3[0] - u1[0]), r2 * (u3[1] - u1[1]), r2 * (u3[2] - u1[2]))
     w3 = (
-        r3 * (u[m, 2, 0] - 2.0 * u[m, 1, 0] + u[m, 0, 0]),
-        r3 * (u[m, 2, 1] - 2.0 * u[m, 1, 1] + u[m, 0, 1]),
-        r3 * (u[m, 2, 2] - 2.0 * u[m, 1, 2] + u[m, 0, 2]),
+        r3 * (u3[0] - 2.0 * u2[0] + u1[0]),
+        r3 * (u3[1] - 2.0 * u2[1] + u1[1]),
+        r3 * (u3[2] - 2.0 * u2[2] + u1[2]),
     )
     v1 = (h, 0.0, 0.0)  # v of a2 and a3 is 0
-    c = _cross(w1, w2)
-    d = _cross(v1, w2)
+    c, d = _cross(w1, w2), _cross(v1, w2)
     cw, cv = (-c[0], -c[1], -c[2]), (-d[0], -d[1], -d[2])
     # x = 2 a3 + C1, C2 = [a1, x]/60
     xw = (2.0 * w3[0] + cw[0], 2.0 * w3[1] + cw[1], 2.0 * w3[2] + cw[2])
@@ -191,31 +195,58 @@ def _step(u: Array, m: int, h: float, out: Array, k: int) -> None:
     yw = (-20.0 * w1[0] - w3[0] + cw[0], -20.0 * w1[1] - w3[1] + cw[1], -20.0 * w1[2] - w3[2] + cw[2])
     yv = (-20.0 * h + cv[0], cv[1], cv[2])
     p, q, r = _cross(yw, zw), _cross(yw, zv), _cross(yv, zw)
-    wx = w1[0] + w3[0] / 12.0 - p[0] / 240.0
-    wy = w1[1] + w3[1] / 12.0 - p[1] / 240.0
-    wz = w1[2] + w3[2] / 12.0 - p[2] / 240.0
     v = (h - (q[0] + r[0]) / 240.0, -(q[1] + r[1]) / 240.0, -(q[2] + r[2]) / 240.0)
-    # exp(Omega): V(omega) v and the quaternion
-    squared = wx * wx + wy * wy + wz * wz
-    cosine, half, a, b = exponential(squared)
-    e = slope_coefficients(squared, a, b)[0]
-    w = (wx, wy, wz)
-    once = _cross(w, v)
-    twice = _cross(w, once)
-    for i in range(3):
-        out[k, i] = v[i] + b * once[i] + e * twice[i]
-        out[k, 4 + i] = half * w[i]
-    out[k, 3] = cosine
+    return v, (
+        w1[0] + w3[0] / 12.0 - p[0] / 240.0,
+        w1[1] + w3[1] / 12.0 - p[1] / 240.0,
+        w1[2] + w3[2] / 12.0 - p[2] / 240.0,
+    )
 
 
-@njit(cache=True, nogil=True)
-def increments(u: Array, h: Array, out: Array) -> None:
-    """Displacements ``out`` (M, 7) of single steps: shapes ``u`` (M, 3, 3), lengths ``h`` (M,)."""
-    for m in range(h.shape[0]):
-        _step(u, m, h[m], out, m)
+@njit(cache=True, nogil=True, error_model="numpy")
+def increments(u: Array, first: int, h: Array, out: Array) -> None:
+    """Displacements ``out`` (M, 7) of M single steps: the exponentials of their Omega, in lanes of steps.
+
+    ``h`` (M,) are their lengths; the shapes of step 0 are the rows 3 ``first``... of ``u`` (..., 3), three a step.
+    """
+    L, M = LANES, h.shape[0]
+    # u (9), h, v (3), w (3), |w|/2 with its sine and cosine; then the displacements
+    scratch = np.empty(19 * L)
+    U, rows = table(scratch, 0, 9, L), table(scratch, 9 * L, 1, 10 * L)
+    flat, result = strip(u, 0, u.size), strip(out, 0, 7 * M)
+    for m in range(0, M, L):
+        lanes = min(L, M - m)
+        load(flat, 9 * (first + m), 9, 9, lanes, U, 1)
+        for l in range(L):
+            rows[0, l] = h[m + min(l, lanes - 1)]
+        for l in range(L):
+            u1, u2, u3 = (U[0, l], U[1, l], U[2, l]), (U[3, l], U[4, l], U[5, l]), (U[6, l], U[7, l], U[8, l])
+            v, w = _magnus(rows[0, l], u1, u2, u3)
+            rows[0, L + l], rows[0, 2 * L + l], rows[0, 3 * L + l] = v
+            rows[0, 4 * L + l], rows[0, 5 * L + l], rows[0, 6 * L + l] = w
+            rows[0, 7 * L + l] = 0.5 * math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        sines(rows, 0, 7 * L, 8 * L, 9 * L, 1.0, 1)
+        for l in range(L):
+            v = (rows[0, L + l], rows[0, 2 * L + l], rows[0, 3 * L + l])
+            w = (rows[0, 4 * L + l], rows[0, 5 * L + l], rows[0, 6 * L + l])
+            half, cosine = rows[0, 7 * L + l], rows[0, 9 * L + l]
+            # below 1e-150 squares underflow; there sin(x)/x is 1 to the last digit
+            ratio = rows[0, 8 * L + l] / half if half > 1e-150 else 1.0
+            b = 0.5 * ratio * ratio
+            c = slope_coefficients(4.0 * half * half, ratio * cosine, b)[0]
+            # V(w) v = v + B w x v + C w x (w x v)
+            once = _cross(w, v)
+            twice = _cross(w, once)
+            U[0, l] = v[0] + b * once[0] + c * twice[0]
+            U[1, l] = v[1] + b * once[1] + c * twice[1]
+            U[2, l] = v[2] + b * once[2] + c * twice[2]
+            U[3, l] = cosine
+            U[4, l], U[5, l], U[6, l] = 0.5 * ratio * w[0], 0.5 * ratio * w[1], 0.5 * ratio * w[2]
+        unload(scratch, 0, 7, lanes, result, 7 * m, 7, 1)
+    scratch[0] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _compose(a: Array, i: int, b: Array, j: int, out: Array, k: int) -> None:
     """out[k] = a[i] b[j] for poses (7,); one Newton step keeps the quaternion at length 1."""
     w, x, y, z = a[i, 3], a[i, 4], a[i, 5], a[i, 6]
@@ -235,7 +266,7 @@ def _compose(a: Array, i: int, b: Array, j: int, out: Array, k: int) -> None:
     out[k, 3], out[k, 4], out[k, 5], out[k, 6] = scale * qw, scale * qx, scale * qy, scale * qz
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def accumulate(start: Array, increment: Array, out: Array) -> None:
     """Poses ``out`` (M + 1, 7) from ``start`` (7,) on through the displacements (M, 7)."""
     out[0] = start
@@ -243,25 +274,25 @@ def accumulate(start: Array, increment: Array, out: Array) -> None:
         _compose(out, m, increment, m, out, m + 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def march(u: Array, h: Array, start: Array, out: Array) -> None:
-    """Poses ``out`` (B (M + 1), 7) of curves: ``start`` (B, 7), shapes ``u`` (B M, 3, 3), steps ``h``."""
+    """Poses ``out`` (B (M + 1), 7) of curves: ``start`` (B, 7), shapes ``u`` (3 B M, 3), steps ``h``."""
     M = h.shape[0]
-    step = np.empty((1, 7))
+    steps = np.empty((M, 7))
     for b in range(start.shape[0]):
         k = b * (M + 1)
         out[k] = start[b]
+        increments(u, b * M, h, steps)
         for m in range(M):
-            _step(u, b * M + m, h[m], step, 0)
-            _compose(out, k + m, step, 0, out, k + m + 1)
+            _compose(out, k + m, steps, m, out, k + m + 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def differences(whole: Array, halves: Array, u: Array, at_ends: Array, h: Array, weight: float, error: Array) -> None:
     """How far step i (M, 7) is from half steps 2 i and 2 i + 1 (2 M, 7): position + ``weight`` x rotation.
 
     The rotation includes what may hide between the outermost nodes and the ends: there the shape ``at_ends``
-    (2, M, 3) should be the polynomial through its values ``u`` (M, 6, 3) at the six nodes.
+    (2 M, 3) should be the polynomial through its values ``u`` (6 M, 3) at the six nodes.
     """
     both = np.empty((1, 7))
     for m in range(whole.shape[0]):
@@ -274,9 +305,9 @@ def differences(whole: Array, halves: Array, u: Array, at_ends: Array, h: Array,
             r += (both[0, i] + whole[m, i]) ** 2
         hidden = 0.0
         for i in range(3):
-            first, last = at_ends[0, m, i], at_ends[1, m, i]
+            first, last = at_ends[m, i], at_ends[whole.shape[0] + m, i]
             for n in range(6):
-                first -= TO_START[n] * u[m, n, i]
-                last -= TO_START[5 - n] * u[m, n, i]
+                first -= TO_START[n] * u[6 * m + n, i]
+                last -= TO_START[5 - n] * u[6 * m + n, i]
             hidden += abs(first) + abs(last)
         error[m] = math.sqrt(p) + weight * (2.0 * math.sqrt(min(q, r)) + OUTER * h[m] * hidden)
