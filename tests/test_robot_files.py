@@ -190,6 +190,8 @@ def test_toml_errors_say_where(tmp_path: Path, text: str, error: type, message: 
 def test_files_that_are_not_there_or_too_large(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         Robot.from_toml(tmp_path / "none.toml")
+    with pytest.raises(InputError, match="cannot be written"):
+        snake(2, 0.1).to_toml(tmp_path / "none" / "robot.toml")
     large = tmp_path / "large.csv"
     large.write_bytes(b"#" * 4_000_001)
     with pytest.raises(InputError, match="4 MB"):

@@ -106,7 +106,7 @@ def test_batch_equals_one_by_one() -> None:
     poses = frames_from_nodes(u, h, starts)
     assert poses.shape == (2, 3, 8, 7)
     assert np.array_equal(poses[1, 2], frames_from_nodes(u[1, 2], h, starts[1, 2]))
-    assert np.abs(poses[..., 0, :] - starts).max() == 0.0
+    assert np.abs(poses[..., 0, :] - starts).max() < 1e-15
     assert frames_from_nodes(np.zeros((0, 4, 3, 3)), np.ones(4)).shape == (0, 5, 7)
 
 
@@ -132,6 +132,8 @@ def test_refusals() -> None:
         frames_from_nodes(np.zeros((4, 3, 2)), np.ones(4))
     with pytest.raises(InputError, match="start"):
         frames_from_nodes(np.zeros((4, 3, 3)), np.ones(4), np.zeros((5, 7)))
+    with pytest.raises(InputError, match="length 1"):
+        frames_from_nodes(np.zeros((4, 3, 3)), np.ones(4), np.zeros(7))
     with pytest.raises(SolveError, match="not_converged"):
         noise = np.random.default_rng(0)
         curve_frames(lambda s: noise.normal(size=(len(s), 3)) * 1e3, [0.0, 1.0])

@@ -170,9 +170,9 @@ class Robot:
 
     def joint_index(self, name: str) -> int:
         """Column of a joint in q; UnknownNameError otherwise."""
-        if name not in self._joints:
+        if name not in self._column:
             raise UnknownNameError("joint", name, self.joints)
-        return self.joints.index(name)
+        return self._column[name]
 
     # --- kinematics -----------------------------------------------------------------------------------------
 

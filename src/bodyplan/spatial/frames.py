@@ -66,9 +66,7 @@ def curve_frames(
     if len(s) == 0 or np.any(np.diff(s) < 0.0):
         raise InputError("s: needs at least one value, and values that do not decrease.")
     pose = np.array(finite(IDENTITY if start is None else start, "start", (7,)))
-    if abs(np.linalg.norm(pose[3:]) - 1.0) > 1e-9:
-        raise InputError(f"start: the quaternion (w, x, y, z) must have length 1, got {pose[3:]}.")
-    pose[3:] /= np.linalg.norm(pose[3:])
+    pose[3:] /= _unit_norms(pose[3:])
     length = float(s[-1] - s[0])
     ends, increments = _adaptive(shape, s, length, tolerance)
     poses = np.empty((len(ends) + 1, 7))
@@ -90,17 +88,25 @@ def frames_from_nodes(shapes: ArrayLike, steps: ArrayLike, start: ArrayLike | No
     if u.ndim < 3 or u.shape[-3:] != (len(h), 3, 3):
         raise InputError(f"shapes: expected shape (..., {len(h)}, 3, 3), got {u.shape}.")
     lead = u.shape[:-3]
-    first = finite(IDENTITY if start is None else start, "start")
-    if first.shape[-1:] != (7,) or np.broadcast_shapes(first.shape[:-1], lead) != lead:
-        raise InputError(f"start: expected shape (7,) or (..., 7) with batch {lead}, got {first.shape}.")
-    if np.any(np.abs(np.linalg.norm(first[..., 3:], axis=-1) - 1.0) > 1e-9):
-        raise InputError("start: quaternions (w, x, y, z) must have length 1.")
+    begin = finite(IDENTITY if start is None else start, "start")
+    try:
+        begin = np.array(np.broadcast_to(begin, (*lead, 7)))
+    except ValueError as error:
+        raise InputError(f"start: expected shape (7,) or (..., 7) with batch {lead}, got {begin.shape}.") from error
+    begin[..., 3:] /= _unit_norms(begin[..., 3:])
     size = int(np.prod(lead, dtype=np.int64))
     flat = np.array(u.reshape(size * len(h) * 3, 3), order="C")
     poses = np.empty((size * (len(h) + 1), 7))
-    begin = np.array(np.broadcast_to(first, (*lead, 7)).reshape(size, 7))
-    march(flat, np.array(h), begin, poses)
+    march(flat, np.array(h), begin.reshape(size, 7), poses)
     return poses.reshape(*lead, len(h) + 1, 7)
+
+
+def _unit_norms(quaternions: Array) -> Array:
+    """Lengths (..., 1) of ``start`` quaternions, InputError where they are not 1 to 1e-9."""
+    norms = np.asarray(np.linalg.norm(quaternions, axis=-1, keepdims=True))
+    if np.any(np.abs(norms - 1.0) > 1e-9):
+        raise InputError("start: quaternions (w, x, y, z) must have length 1 to 1e-9.")
+    return norms
 
 
 def _adaptive(shape: Callable[[Array], ArrayLike], s: Array, length: float, tolerance: float) -> tuple[Array, Array]:
@@ -149,7 +155,7 @@ def _first_steps(s: Array, longest: float) -> tuple[Array, Array]:
 def _displacements(
     shape: Callable[[Array], ArrayLike], low: Array, high: Array, also: Array
 ) -> tuple[Array, Array, Array]:
-    """Displacements (M, 7) of single steps from ``low`` to ``high`` (M,), the shapes (M, 3, 3) at their nodes, and
+    """Displacements (M, 7) of single steps from ``low`` to ``high`` (M,), the shapes (3 M, 3) at their nodes, and
     those (..., 3) at the places ``also``."""
     h = high - low
     places = np.concatenate([(low[:, None] + h[:, None] * _NODES).ravel(), also])
