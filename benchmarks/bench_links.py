@@ -1,6 +1,6 @@
 """Links on a curve: certified circles against a loop of scipy.optimize.brentq, same curve, same answers.
 
-    python benchmarks/bench_links.py
+python benchmarks/bench_links.py
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ def python_curve(gammas: np.ndarray, head: float):
     if flat is None:
         pieces.append((x, value, head))
         flat = x + crossing_of(head, 1.0, 2)
-    table = [(start, v, g, 0.0 if g is None else np.sqrt(1 - g * g), 0.0 if g is None else np.arccos(g)) for start, v, g in pieces]
+    table = [
+        (start, v, g, 0.0 if g is None else np.sqrt(1 - g * g), 0.0 if g is None else np.arccos(g))
+        for start, v, g in pieces
+    ]
     exp, sin = np.exp, np.sin
 
     def y(x: float) -> float:
@@ -38,7 +41,11 @@ def python_curve(gammas: np.ndarray, head: float):
             return 0.0
         for start, v, g, delta, theta in reversed(table):
             if x >= start:
-                return float(sin(x)) if g is None else float(v * exp(-g * (x - start)) / delta * sin(delta * (x - start) + theta))
+                return (
+                    float(sin(x))
+                    if g is None
+                    else float(v * exp(-g * (x - start)) / delta * sin(delta * (x - start) + theta))
+                )
         return 0.0
 
     return y
@@ -50,7 +57,9 @@ def by_brentq(curves: list) -> np.ndarray:
         x, here = 0.0, 0.0
         for i in range(LINKS):
             x0, y0 = x, here
-            x = brentq(lambda s: (s - x0) ** 2 + (y(s) - y0) ** 2 - LENGTH**2, x0, x0 + LENGTH * (1 + 1e-12), xtol=1e-13)  # noqa: B023
+            x = brentq(
+                lambda s: (s - x0) ** 2 + (y(s) - y0) ** 2 - LENGTH**2, x0, x0 + LENGTH * (1 + 1e-12), xtol=1e-13
+            )  # noqa: B023
             here = y(x)
             out[k, i + 1] = x, here
     return out
@@ -61,14 +70,20 @@ def main() -> None:
     gammas, heads = rng.uniform(0, 0.8, (2000, MODULES)), rng.uniform(0, 0.8, 2000)
     few = 20
     slow = [python_curve(g, h) for g, h in zip(gammas[:few], heads[:few], strict=True)]
-    error = np.abs(by_brentq(slow) - bp.links_on_curve(bp.ConcertinaCurve(gammas[:few], heads[:few]), LENGTH, LINKS).points).max()
+    error = np.abs(
+        by_brentq(slow) - bp.links_on_curve(bp.ConcertinaCurve(gammas[:few], heads[:few]), LENGTH, LINKS).points
+    ).max()
     header(f"{LINKS} links on concertina curves; the two agree to {error:.1e}")
     compare(
         {
             "bodyplan, batch of 2000 curves (curves built too)": (
-                lambda: bp.links_on_curve(bp.ConcertinaCurve(gammas, heads), LENGTH, LINKS), 2000),
+                lambda: bp.links_on_curve(bp.ConcertinaCurve(gammas, heads), LENGTH, LINKS),
+                2000,
+            ),
             "bodyplan, one curve a call": (
-                lambda: bp.links_on_curve(bp.ConcertinaCurve(gammas[0], heads[0]), LENGTH, LINKS), 1),
+                lambda: bp.links_on_curve(bp.ConcertinaCurve(gammas[0], heads[0]), LENGTH, LINKS),
+                1,
+            ),
             "scipy.optimize.brentq, loop": (lambda: by_brentq(slow), few),
         },
         unit="fit",

@@ -75,6 +75,22 @@ def test_batch_equals_one_by_one():
         assert one.status == batch.status[i]
 
 
+def test_a_joint_on_the_peak_where_the_slope_vanishes():
+    # the distance starts to grow at rate 0 there: an iteration that trusts its small first step would stop at once
+    curve = ConcertinaCurve([0.0] * 4, 0.0)
+    for start in (np.pi / 2, np.nextafter(np.pi / 2, 0.0), np.nextafter(np.pi / 2, 9.0), 1.5 * np.pi):
+        points, _ = bp.links_on_curve(curve, 0.75, 6, start=start)
+        np.testing.assert_allclose(np.linalg.norm(np.diff(points, axis=0), axis=1), 0.75, rtol=1e-12)
+        np.testing.assert_allclose(points[:, 1], np.sin(points[:, 0]), atol=1e-13)
+
+
+def test_half_waves_cut_off_are_too_tight_however_flat():
+    curve = ConcertinaCurve([0.0] * 4, 0.0)
+    assert bp.links_on_curve(curve, 7.0, 1).status == "too_tight"
+    flat = ConcertinaCurve([0.0] * 4, 0.0, tail=0.01)
+    assert bp.links_on_curve(flat, 7.0, 1).status == "ok"
+
+
 def test_a_fold_under_a_link_is_a_status():
     curve = ConcertinaCurve([0.0] * 4, 0.0, omega=8.0)
     fit = bp.links_on_curve(curve, 2.0, 3)

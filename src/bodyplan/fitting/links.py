@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from math import atan2, pi, sqrt
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, IntArray, TextArray, finite, number, whole
@@ -24,6 +24,8 @@ from bodyplan.errors import InputError, SolveError, Status
 
 #: a link whose curve is longer than this many link lengths (half a circle over the link) skips a fold
 TIGHT_ARC = 0.5 * pi
+#: or, where it spans more than a half wave, than this many: a whole fold is cut off
+FOLD_ARC = 1.05
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ class LinksFit:
     """Links fitted to a curve; unpacks as ``points, angles``.
 
     ``points`` (..., n + 1, 2) joints from the start on, curve units. ``angles`` (..., n) absolute angles of the links,
-    rad, in (-pi/2, pi/2]. ``status`` (...): "ok", or "too_tight" where the curve between two joints is longer than
-    half a circle over the link, so that the link cuts across a fold; ``link`` (...) the first such link, else -1.
+    rad, in (-pi/2, pi/2]. ``status`` (...): "ok", or "too_tight" where the curve folds under a link: the arc between its
+    joints is longer than half a circle over it, or a whole half wave fits in between; ``link`` (...) the first such link, else -1.
     """
 
     points: Array
@@ -70,23 +72,37 @@ def _bounds(piece: Array, omega: float, y: float, slope: float) -> tuple[float, 
 
 
 @njit(cache=True)
-def next_joint(x0: float, y0: float, k: int, length: float, pieces: Array, count: int, omega: float) -> float:
-    """x of the first point ahead of (x0, y0), which lies on piece k, at distance ``length`` (kernel)."""
-    x = x0
+def next_joint(
+    x0: float, y0: float, k: int, steepest: float, length: float, pieces: Array, count: int, omega: float
+) -> float:
+    """x of the first point ahead of (x0, y0) at distance ``length``; it lies on piece k, on the rest of which the curve is
+    no steeper than ``steepest`` (kernel)."""
+    # the arc is at least as long as the distance
+    x = x0 + length / sqrt(1.0 + steepest * steepest)
+    if k + 1 < count and x >= pieces[k + 1, pc.START]:
+        x = pieces[k + 1, pc.START]
+        k += 1
     reach = x0 + length  # the distance is at least x - x0, so the answer is not beyond
     while True:
         end = reach
         if k + 1 < count and pieces[k + 1, pc.START] < end:
             end = pieces[k + 1, pc.START]
-        y, slope, _ = pc.piece_value(x, pieces[k], omega)
-        m1, m2 = _bounds(pieces[k], omega, y, slope)
-        bound = 2.0 + 2.0 * m1 * m1 + 2.0 * length * m2
+        y, slope, curve = pc.piece_value(x, pieces[k], omega)
         while True:
             dx, dy = x - x0, y - y0
             g = (dx - length) * (dx + length) + dy * dy
             if g >= 0.0:
                 return x
             g1 = 2.0 * (dx + dy * slope)
+            m1, m2 = _bounds(pieces[k], omega, y, slope)
+            left = end - x
+            if g1 + min(2.0 - 2.0 * (abs(dy) + m1 * left) * m2, 0.0) * left > 0.0:
+                # the distance grows all the way to the end: one root at most, any fast iteration finds it
+                found = _growing(x0, y0, x, end, length, g, g1, curve, slope, dy, pieces[k], omega)
+                if found < np.inf:
+                    return found
+                break
+            bound = 2.0 + 2.0 * m1 * m1 + 2.0 * length * m2
             root = sqrt(g1 * g1 - 2.0 * bound * g)
             # the smaller root of g + g1 h + bound h^2 / 2, without cancellation
             step = (root - g1) / bound if g1 < 0.0 else -2.0 * g / (root + g1)
@@ -95,7 +111,7 @@ def next_joint(x0: float, y0: float, k: int, length: float, pieces: Array, count
             if step <= 2e-16 * length or x + step == x:
                 return x
             x += step
-            y, slope, _ = pc.piece_value(x, pieces[k], omega)
+            y, slope, curve = pc.piece_value(x, pieces[k], omega)
         if end == reach:
             # only a level link reaches so far, and rounding may put it past the last piece's own answer
             return reach
@@ -104,11 +120,60 @@ def next_joint(x0: float, y0: float, k: int, length: float, pieces: Array, count
 
 
 @njit(cache=True)
+def _growing(
+    x0: float,
+    y0: float,
+    x: float,
+    end: float,
+    length: float,
+    g: float,
+    g1: float,
+    curve: float,
+    slope: float,
+    dy: float,
+    piece: Array,
+    omega: float,
+) -> float:
+    """Root of the squared distance minus length^2 in (x, end], where it grows: roots of local parabolas in a bracket
+    (cubic convergence); inf where it is negative up to the end (kernel)."""
+    low, high, open_end = x, end, True
+    for _ in range(100):
+        g2 = 2.0 + 2.0 * slope * slope + 2.0 * dy * curve
+        inner = g1 * g1 - 2.0 * g * g2
+        # root of the local parabola, also where g1 is 0; never small unless g is
+        step = -2.0 * g / (g1 + sqrt(inner)) if inner > 0.0 and g1 >= 0.0 else np.inf
+        following = x + step
+        # cubic convergence: the next error is below rounding
+        if abs(step) <= 3e-6 * length and low <= following <= high:
+            return following
+        if not low < following < high:
+            if open_end:
+                y = pc.piece_value(end, piece, omega)[0]
+                if (end - x0 - length) * (end - x0 + length) + (y - y0) * (y - y0) < 0.0:
+                    return np.inf
+                open_end = False
+            following = 0.5 * (low + high)
+            if high - low <= 4e-16 * (abs(high) + length):
+                return following
+        x = following
+        y, slope, curve = pc.piece_value(x, piece, omega)
+        dy = y - y0
+        g = (x - x0 - length) * (x - x0 + length) + dy * dy
+        g1 = 2.0 * (x - x0 + dy * slope)
+        if g < 0.0:
+            low = x
+        elif g > 0.0:
+            high, open_end = x, False
+        else:
+            return x
+    return x
+
+
+@njit(cache=True)
 def _tight(
     a: float,
     b: float,
-    y: float,
-    k: int,
+    steepest: float,
     length: float,
     pieces: Array,
     count: int,
@@ -116,22 +181,17 @@ def _tight(
     nodes: Array,
     weights: Array,
 ) -> bool:
-    """True where the arc from x = a to b is longer than TIGHT_ARC links; integrates only where a bound leaves doubt."""
-    steepest = 0.0
-    x = a
-    while k < count and x <= b:
-        y, slope, _ = pc.piece_value(x, pieces[k], omega)
-        steepest = max(steepest, _bounds(pieces[k], omega, y, slope)[0])
-        k += 1
-        if k < count:
-            x = pieces[k, pc.START]
-    if (b - a) * sqrt(1.0 + steepest * steepest) <= TIGHT_ARC * length:
+    """True where the curve folds under the link from x = a to b, on a piece no steeper than ``steepest`` if on one piece:
+    the arc is longer than half a circle over the link, or a half wave fits under it. Integrates only where in doubt."""
+    whole_fold = (b - a) * omega > pi
+    if not whole_fold and (b - a) * sqrt(1.0 + steepest * steepest) <= TIGHT_ARC * length:
         return False
-    return pc.arc_between(a, b, pieces, count, omega, nodes, weights) > TIGHT_ARC * length
+    arc = pc.arc_between(a, b, pieces, count, omega, nodes, weights)
+    return arc > TIGHT_ARC * length or (whole_fold and arc > FOLD_ARC * length)
 
 
 @njit(cache=True)
-def fit_chain(
+def place_chain(
     lengths: Array,
     start: float,
     pieces: Array,
@@ -141,26 +201,46 @@ def fit_chain(
     weights: Array,
     points: Array,
     angles: Array,
-    rates: Array,
 ) -> int:
-    """One chain on one curve (kernel). Fills points (n+1, 2), angles (n,), rates (2, n): first and second
-    derivative of the angles with respect to the curve's progress t. Returns the first link too tight, or -1."""
+    """One chain on one curve (kernel): fills points (n+1, 2) and angles (n,). Returns the first link too tight, or -1."""
     x = start
     k = pc.piece_at(x, pieces, count)
-    y, yx, yxx, yt, yxt, ytt = pc.piece_jet(x, pieces[k], omega)
-    # the start stands still in x: only the curve moves under it
-    xd, xdd = 0.0, 0.0
-    yd, ydd = yt, ytt
+    y, slope, _ = pc.piece_value(x, pieces[k], omega)
     points[0, 0], points[0, 1] = x, y
     tight = -1
     for i in range(lengths.size):
         length = lengths[i]
+        steepest = _bounds(pieces[k], omega, y, slope)[0]
+        xn = next_joint(x, y, k, steepest, length, pieces, count, omega)
         before = k
-        xn = next_joint(x, y, k, length, pieces, count, omega)
-        k = pc.piece_at(xn, pieces, count)
-        yn, yx, yxx, yt, yxt, ytt = pc.piece_jet(xn, pieces[k], omega)
+        while k + 1 < count and xn >= pieces[k + 1, pc.START]:
+            k += 1
+        if tight < 0:
+            for j in range(before + 1, k + 1):  # a piece is steepest for its energy at the start, |V| omega
+                steepest = max(steepest, abs(pieces[j, pc.V]) * omega)
+            if _tight(x, xn, steepest, length, pieces, count, omega, nodes, weights):
+                tight = i
+        yn, slope, _ = pc.piece_value(xn, pieces[k], omega)
+        angles[i] = atan2(yn - y, xn - x)
+        x, y = xn, yn
+        points[i + 1, 0], points[i + 1, 1] = x, y
+    return tight
+
+
+@njit(cache=True)
+def chain_rates(points: Array, pieces: Array, count: int, omega: float, rates: Array) -> None:
+    """First and second derivative of the links' angles with respect to the curve's progress t, (2, n), for joints placed
+    on the curve (kernel). The first joint keeps its x."""
+    x, y = points[0, 0], points[0, 1]
+    k = pc.piece_at(x, pieces, count)
+    _, _, _, yd, _, ydd = pc.piece_jet(x, pieces[k], omega)
+    xd, xdd = 0.0, 0.0
+    for i in range(rates.shape[1]):
+        xn, yn = points[i + 1, 0], points[i + 1, 1]
+        while k + 1 < count and xn >= pieces[k + 1, pc.START]:
+            k += 1
+        _, yx, yxx, yt, yxt, ytt = pc.piece_jet(xn, pieces[k], omega)
         ux, uy = xn - x, yn - y
-        angles[i] = atan2(uy, ux)
         # u . u' = 0 along t, twice: the new joint's speed and acceleration along x
         across = ux + uy * yx
         xnd = (ux * xd + uy * (yd - yt)) / across
@@ -169,17 +249,16 @@ def fit_chain(
         bend = yxx * xnd * xnd + 2.0 * yxt * xnd + ytt
         xndd = (ux * xdd + uy * (ydd - bend) - vx * vx - vy * vy) / across
         yndd = yx * xndd + bend
-        square = length * length
+        square = ux * ux + uy * uy
         rates[0, i] = (ux * vy - uy * vx) / square
         rates[1, i] = (ux * (yndd - ydd) - uy * (xndd - xdd)) / square
-        if tight < 0 and _tight(x, xn, y, before, length, pieces, count, omega, nodes, weights):
-            tight = i
         x, y, xd, yd, xdd, ydd = xn, yn, xnd, ynd, xndd, yndd
-        points[i + 1, 0], points[i + 1, 1] = x, y
-    return tight
 
 
-@njit(cache=True)
+#: curves from which a batch is worth the threads
+PARALLEL = 64
+
+
 def _fit_batch(
     lengths: Array,
     start: Array,
@@ -192,11 +271,12 @@ def _fit_batch(
     angles: Array,
     tight: IntArray,
 ) -> None:
-    rates = np.empty((2, lengths.size))
-    for b in range(counts.size):
-        tight[b] = fit_chain(
-            lengths, start[b], pieces[b], counts[b], omega, nodes, weights, points[b], angles[b], rates
-        )
+    for b in prange(counts.size):
+        tight[b] = place_chain(lengths, start[b], pieces[b], counts[b], omega, nodes, weights, points[b], angles[b])
+
+
+_fit_serial = njit(cache=True)(_fit_batch)
+_fit_parallel = njit(cache=True, parallel=True)(_fit_batch)
 
 
 def link_lengths(link_length: ArrayLike, links: int | None) -> Array:
@@ -235,7 +315,8 @@ def links_on_curve(
     size = counts.size
     points, angles = np.empty((size, lengths.size + 1, 2)), np.empty((size, lengths.size))
     tight = np.empty(size, dtype=np.int64)
-    _fit_batch(lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight)
+    fit = _fit_parallel if size >= PARALLEL else _fit_serial
+    fit(lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight)
     points, angles = points.reshape(*curve.batch, *points.shape[1:]), angles.reshape(*curve.batch, -1)
     status = np.where(tight < 0, Status.OK.value, Status.TOO_TIGHT.value).reshape(curve.batch)
     if not curve.batch:

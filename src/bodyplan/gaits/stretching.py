@@ -16,7 +16,7 @@ from numba import njit
 from bodyplan.arrays import Array, IntArray, frozen
 from bodyplan.curves import pieces as pc
 from bodyplan.curves.concertina import GAUSS_NODES, GAUSS_WEIGHTS, ConcertinaCurve
-from bodyplan.fitting.links import fit_chain
+from bodyplan.fitting.links import chain_rates, place_chain
 
 BLENDS = {"linear": 0, "smooth": 1}
 
@@ -123,7 +123,8 @@ def body_at(
     omega, crossing, rule, lead = curve
     _ramps(s, initial, final, start, duration, blend, parameters)
     count = pc.build_pieces(parameters[0], parameters[1:], omega, crossing, rule, lead, pieces)
-    tight = fit_chain(lengths, 0.0, pieces, count, omega, nodes, weights, points, angles, rates)
+    tight = place_chain(lengths, 0.0, pieces, count, omega, nodes, weights, points, angles)
+    chain_rates(points, pieces, count, omega, rates)
     extent, first, second = 0.0, 0.0, 0.0
     for j in range(lengths.size):
         c, si = np.cos(angles[j]) * lengths[j], np.sin(angles[j]) * lengths[j]
