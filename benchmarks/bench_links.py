@@ -6,10 +6,10 @@ python benchmarks/bench_links.py
 from __future__ import annotations
 
 import numpy as np
-from _bench import compare, header
 from scipy.optimize import brentq
 
 import bodyplan as bp
+from _bench import compare, header
 from bodyplan.curves.dynamic import crossing_of
 
 LINKS, LENGTH, MODULES = 26, 0.873938881878, 4
@@ -51,15 +51,17 @@ def python_curve(gammas: np.ndarray, head: float):
     return y
 
 
+def miss(s: float, x0: float, y0: float, y) -> float:
+    return (s - x0) ** 2 + (y(s) - y0) ** 2 - LENGTH**2
+
+
 def by_brentq(curves: list) -> np.ndarray:
     out = np.zeros((len(curves), LINKS + 1, 2))
     for k, y in enumerate(curves):
         x, here = 0.0, 0.0
         for i in range(LINKS):
             x0, y0 = x, here
-            x = brentq(
-                lambda s: (s - x0) ** 2 + (y(s) - y0) ** 2 - LENGTH**2, x0, x0 + LENGTH * (1 + 1e-12), xtol=1e-13
-            )  # noqa: B023
+            x = brentq(miss, x0, x0 + LENGTH * (1 + 1e-12), args=(x0, y0, y), xtol=1e-13)
             here = y(x)
             out[k, i + 1] = x, here
     return out

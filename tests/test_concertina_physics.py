@@ -1,4 +1,4 @@
-"""What physics makes of the concertina gaits: bars measured beforehand, with the controls that show what they measure."""
+"""What physics makes of the concertina gaits: bars measured beforehand, and the controls that give them a meaning."""
 
 import numpy as np
 import pytest
@@ -30,8 +30,11 @@ def mirrored():
 
 @pytest.fixture(scope="module")
 def waves():
-    return trial({"body_modules": 8, "omega": 1.2, "extension": 0.35, "waves": 2, "max_joint_rate": 1.0}, corridor(0.1),
-                 (20.0, 0.4))
+    return trial(
+        {"body_modules": 8, "omega": 1.2, "extension": 0.35, "waves": 2, "max_joint_rate": 1.0},
+        corridor(0.1),
+        (20.0, 0.4),
+    )
 
 
 def test_the_paper_s_gait_loses_two_thirds_where_folds_let_go(mirrored):
@@ -50,8 +53,9 @@ def test_travelling_waves_keep_their_advance(mirrored, waves):
 
 
 def test_waves_are_faster_than_the_warped_mirror_at_equal_joint_rate(waves):
-    mirror = trial({"body_modules": 8, "omega": 1.2, "contraction": "mirror", "max_joint_rate": 1.0}, corridor(0.1),
-                   (20.0, 0.4))
+    mirror = trial(
+        {"body_modules": 8, "omega": 1.2, "contraction": "mirror", "max_joint_rate": 1.0}, corridor(0.1), (20.0, 0.4)
+    )
     assert waves.speed >= 1.4 * mirror.speed
 
 
@@ -61,8 +65,11 @@ def test_one_wave_in_the_corridor():
 
 
 def test_too_little_squeeze_does_not_hold(waves):
-    loose = trial({"body_modules": 8, "omega": 1.2, "extension": 0.35, "waves": 2, "max_joint_rate": 1.0},
-                  corridor(0.106), (20.0, 0.4))
+    loose = trial(
+        {"body_modules": 8, "omega": 1.2, "extension": 0.35, "waves": 2, "max_joint_rate": 1.0},
+        corridor(0.106),
+        (20.0, 0.4),
+    )
     assert loose.advance_ratio < 0.6 * waves.advance_ratio
 
 

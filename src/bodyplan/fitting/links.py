@@ -33,8 +33,9 @@ class LinksFit:
     """Links fitted to a curve; unpacks as ``points, angles``.
 
     ``points`` (..., n + 1, 2) joints from the start on, curve units. ``angles`` (..., n) absolute angles of the links,
-    rad, in (-pi/2, pi/2]. ``status`` (...): "ok", or "too_tight" where the curve folds under a link: the arc between its
-    joints is longer than half a circle over it, or a whole half wave fits in between; ``link`` (...) the first such link, else -1.
+    rad, in (-pi/2, pi/2]. ``status`` (...): "ok", or "too_tight" where the curve folds under a link: the arc between
+    its joints is longer than half a circle over it, or a whole half wave fits in between; ``link`` (...) the first
+    such link, else -1.
     """
 
     points: Array
@@ -75,8 +76,8 @@ def _bounds(piece: Array, omega: float, y: float, slope: float) -> tuple[float, 
 def next_joint(
     x0: float, y0: float, k: int, steepest: float, length: float, pieces: Array, count: int, omega: float
 ) -> float:
-    """x of the first point ahead of (x0, y0) at distance ``length``; it lies on piece k, on the rest of which the curve is
-    no steeper than ``steepest`` (kernel)."""
+    """x of the first point ahead of (x0, y0) at distance ``length`` (kernel). The point lies on piece k, on the rest
+    of which the curve is no steeper than ``steepest``."""
     # the arc is at least as long as the distance
     x = x0 + length / sqrt(1.0 + steepest * steepest)
     if k + 1 < count and x >= pieces[k + 1, pc.START]:
@@ -181,7 +182,7 @@ def _tight(
     nodes: Array,
     weights: Array,
 ) -> bool:
-    """True where the curve folds under the link from x = a to b, on a piece no steeper than ``steepest`` if on one piece:
+    """True where the curve, no steeper than ``steepest``, folds under the link from x = a to b (kernel):
     the arc is longer than half a circle over the link, or a half wave fits under it. Integrates only where in doubt."""
     whole_fold = (b - a) * omega > pi
     if not whole_fold and (b - a) * sqrt(1.0 + steepest * steepest) <= TIGHT_ARC * length:
@@ -202,7 +203,7 @@ def place_chain(
     points: Array,
     angles: Array,
 ) -> int:
-    """One chain on one curve (kernel): fills points (n+1, 2) and angles (n,). Returns the first link too tight, or -1."""
+    """One chain on one curve (kernel): fills points (n+1, 2) and angles (n,); the first link too tight, or -1."""
     x = start
     k = pc.piece_at(x, pieces, count)
     y, slope, _ = pc.piece_value(x, pieces[k], omega)
@@ -229,8 +230,8 @@ def place_chain(
 
 @njit(cache=True)
 def chain_rates(points: Array, pieces: Array, count: int, omega: float, rates: Array) -> None:
-    """First and second derivative of the links' angles with respect to the curve's progress t, (2, n), for joints placed
-    on the curve (kernel). The first joint keeps its x."""
+    """First and second derivative of the links' angles by the curve's progress t, (2, n), for joints placed on the
+    curve (kernel). The first joint keeps its x."""
     x, y = points[0, 0], points[0, 1]
     k = pc.piece_at(x, pieces, count)
     _, _, _, yd, _, ydd = pc.piece_jet(x, pieces[k], omega)
