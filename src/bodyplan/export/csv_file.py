@@ -7,7 +7,7 @@ import os
 
 import numpy as np
 
-from bodyplan.export.files import replacing
+from bodyplan.files import replacing
 from bodyplan.motion import Motion
 
 _BASE = ("x [m]", "y [m]", "z [m]", "qw", "qx", "qy", "qz")

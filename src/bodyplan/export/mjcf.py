@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from bodyplan.errors import InputError
-from bodyplan.export.files import replacing
+from bodyplan.files import replacing
 from bodyplan.ground import Plane
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Motion

@@ -13,7 +13,7 @@ import numpy as np
 
 from bodyplan import ground as grounds
 from bodyplan.errors import InputError
-from bodyplan.export.files import replacing
+from bodyplan.files import replacing
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.model import Robot
 

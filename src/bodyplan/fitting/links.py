@@ -14,13 +14,14 @@ from dataclasses import dataclass
 from math import atan2, pi, sqrt
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, IntArray, TextArray, finite, number, whole
 from bodyplan.curves import pieces as pc
 from bodyplan.curves.concertina import GAUSS_NODES, GAUSS_WEIGHTS, ConcertinaCurve
 from bodyplan.errors import InputError, SolveError, Status
+from bodyplan.threads import shared
 
 #: a link whose curve is longer than this many link lengths (half a circle over the link) skips a fold
 TIGHT_ARC = 0.5 * pi
@@ -256,11 +257,14 @@ def chain_rates(points: Array, pieces: Array, count: int, omega: float, rates: A
         x, y, xd, yd, xdd, ydd = xn, yn, xnd, ynd, xndd, yndd
 
 
-#: curves from which a batch is worth the threads
-PARALLEL = 64
+#: curves from which on a batch is shared between threads
+SHARED_FROM = 256
 
 
-def _fit_batch(
+@njit(cache=True, nogil=True)
+def _fit_range(
+    begin: int,
+    end: int,
     lengths: Array,
     start: Array,
     pieces: Array,
@@ -271,13 +275,11 @@ def _fit_batch(
     points: Array,
     angles: Array,
     tight: IntArray,
-) -> None:
-    for b in prange(counts.size):
+) -> int:
+    """:func:`place_chain` for the curves begin .. end - 1 (kernel)."""
+    for b in range(begin, end):
         tight[b] = place_chain(lengths, start[b], pieces[b], counts[b], omega, nodes, weights, points[b], angles[b])
-
-
-_fit_serial = njit(cache=True)(_fit_batch)
-_fit_parallel = njit(cache=True, parallel=True)(_fit_batch)
+    return 0
 
 
 def link_lengths(link_length: ArrayLike, links: int | None) -> Array:
@@ -316,8 +318,8 @@ def links_on_curve(
     size = counts.size
     points, angles = np.empty((size, lengths.size + 1, 2)), np.empty((size, lengths.size))
     tight = np.empty(size, dtype=np.int64)
-    fit = _fit_parallel if size >= PARALLEL else _fit_serial
-    fit(lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight)
+    arguments = (lengths, first, pieces, counts, curve.omega, GAUSS_NODES, GAUSS_WEIGHTS, points, angles, tight)
+    shared(lambda begin, end: int(_fit_range(begin, end, *arguments)), size, threaded_from=SHARED_FROM)
     points, angles = points.reshape(*curve.batch, *points.shape[1:]), angles.reshape(*curve.batch, -1)
     status = np.where(tight < 0, Status.OK.value, Status.TOO_TIGHT.value).reshape(curve.batch)
     if not curve.batch:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.elements import Joint, Variable, WheelRadius
 from bodyplan.robot.tables import COS_30
+from bodyplan.threads import shared
 
 FLOAT = np.dtype(np.float64)
 NO_POSE = np.empty((0, 7))
@@ -83,27 +83,11 @@ def plain(a: Array) -> Array:
 def run(q: Array, size: int, kernel: Callable[[int, int], int]) -> None:
     """Call ``kernel(first, last)`` over ``size`` configurations, large batches in several threads.
 
-    Threads of our own and kernels without the GIL, rather than Numba's prange: that would compile every
-    kernel a second time, and its portable threading layer aborts the process when two threads call it.
-    NUMBA_NUM_THREADS sets their number. InputError for ``q`` when a kernel met a number that is not finite.
+    InputError for ``q`` when a kernel met a number that is not finite.
     """
-    threads = min(_threads(), size // (SHARED_FROM // 2))
-    if size < SHARED_FROM or threads < 2:
-        bad = kernel(0, size)
-    else:
-        share = -(-size // threads // SHARE) * SHARE
-        starts = range(0, size, share)
-        with ThreadPoolExecutor(threads) as pool:
-            bad = max(pool.map(lambda first: kernel(first, min(first + share, size)), starts))
-    if bad >= 0:
+    if shared(kernel, size, threaded_from=SHARED_FROM, multiple=SHARE) >= 0:
         finite(q, "q")
         raise InputError("q: too large, a variable that it drives is not finite.")
-
-
-def _threads() -> int:
-    from numba import config
-
-    return int(getattr(config, "NUMBA_NUM_THREADS", 1))  # set as a module attribute when Numba starts
 
 
 def variable(value: Variable, q: Array, column: Mapping[str, int]) -> Any:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.files import replacing
 from bodyplan.robot.describe import EFFORTS, RATES, Parts, robot_from_dict
 from bodyplan.robot.drive_text import located, quantity, variable
 from bodyplan.robot.elements import Body, Chain, Joint, Row
@@ -49,15 +50,8 @@ def write_toml(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
                     nested = isinstance(v, list) and v and isinstance(v[0], dict)
                     text = "[\n" + "".join(f"  {_toml(entry)},\n" for entry in v) + "]" if nested else _toml(v)
                     lines.append(f"{k} = {text}")
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        temporary.replace(target)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}).") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as file:
+        file.write("\n".join(lines) + "\n")
 
 
 def _toml(value: Any) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bodyplan.errors import InputError, MissingExtraError
-from bodyplan.export.files import replacing
+from bodyplan.files import replacing
 from bodyplan.show import sections
 from bodyplan.show.execution import execution
 from bodyplan.show.figures import write_figures

@@ -16,12 +16,17 @@ from bodyplan.errors import InputError
 def replacing(path: str | os.PathLike[str], mode: str = "w") -> Iterator[IO[Any]]:
     """Open ``path`` for writing (``"w"`` text, ``"wb"`` bytes); the old file stays until all is written.
 
-    Raises InputError when the folder does not exist.
+    Raises InputError when it cannot be written there.
     """
     target = Path(path)
     if not target.parent.is_dir():
-        raise InputError(f"{target}: the folder {target.parent} does not exist.")
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        raise InputError(f"{target}: cannot be written, the folder {target.parent} does not exist.")
+    if target.is_dir():
+        raise InputError(f"{target}: cannot be written, it is a folder.")
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    except OSError as error:
+        raise InputError(f"{target}: cannot be written ({error.strerror}).") from error
     temporary = Path(name)
     try:
         if "b" in mode:
