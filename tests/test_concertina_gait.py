@@ -283,6 +283,42 @@ def test_refuses_what_cannot_be():
             bp.plan(SNAKE, bp.Concertina(), bp.Plane(), wrong)
 
 
+@pytest.mark.parametrize("modules,crossing", [(4, 1), (4, 3), (3, 1), (3, 3), (2, 2), (5, 2)])
+def test_cycle_closes_whatever_the_parity_of_the_half_waves(modules, crossing):
+    gait = bp.Concertina(modules, crossing=crossing, contraction="mirror")
+    period = gait.period(SNAKE)
+    motion = bp.plan(SNAKE, gait, bp.Plane(), [period - 1e-7, period, period + 1e-7])
+    assert motion.ok and np.abs(np.diff(motion.q, axis=0)).max() < 1e-5
+    if (modules + crossing) % 2:
+        with pytest.raises(bp.InputError, match="even"):
+            bp.Concertina(modules, crossing=crossing)
+    else:
+        bp.Concertina(modules, crossing=crossing)
+
+
+def test_a_body_that_lies_differently_from_head_and_tail_is_too_tight():
+    robot = bp.snake(10, 0.05, radius=0.002)
+    unit = 0.05 / bp.exact_link_length(10, 2, 2.5) * 0.8
+    gait = bp.Concertina(2, omega=2.5, contraction="mirror", length_unit=unit)
+    assert set(bp.plan(robot, gait, bp.Plane(), [0.0, 1.0]).status) == {"too_tight"}
+
+
+@pytest.mark.parametrize("options", [
+    {"extension": 0.35, "waves": 2}, {"extension": 0.2}, {"overlap": 0.9}, {"gamma_max": 0.1}, {"extension": 0.05},
+    {"body_modules": 8, "omega": 1.2, "blend": "smooth"}, {"body_modules": 2, "blend": "smooth"},
+    {"body_modules": 8, "omega": 2.0, "contraction": "literal", "blend": "smooth"},
+])  # fmt: skip
+def test_claims_no_rest_that_is_not_planned(options):
+    report = bp.check(cycle_motion(options, samples=300))
+    assert report.ok, str(report)
+
+
+def test_facts_do_not_depend_on_the_samples():
+    coarse, fine = (cycle_motion({"blend": "smooth"}, samples=n).facts["peak_joint_acceleration"] for n in (60, 900))
+    assert coarse == fine
+    assert fine < 250.0
+
+
 def test_options_round_trip():
     for options in GAITS.values():
         gait = bp.Concertina(**options)

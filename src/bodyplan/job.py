@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,15 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.check import check
-from bodyplan.errors import InputError
+from bodyplan.errors import InputError, MissingExtraError
 from bodyplan.metrics import Metrics, metrics_of
 from bodyplan.missions import Mission, load_mission
 from bodyplan.motion import Motion
-from bodyplan.plan import plan
+from bodyplan.plan import MOST_SAMPLES, plan
 from bodyplan.show.outcome import Comparison, Outcome, Variant
 
+#: fewest samples of a cycle: fewer would not show the motion, whatever dt says
+LEAST_SAMPLES = 100
 #: how a caller hears of progress: (what is being done, part done in [0, 1])
 Progress = Callable[[str, float], None]
 
@@ -39,12 +42,19 @@ def mission_times(mission: Mission) -> Array:
     if period is None:
         if time.stop is None:
             raise InputError('time.stop: this gait has no cycle; say how long, for example stop = "10 s".')
-        steps = max(1, int(np.ceil(time.stop / time.dt)))
+        _bounded(time.stop / time.dt)
+        steps = max(LEAST_SAMPLES, int(np.ceil(time.stop / time.dt)))
         return np.linspace(0.0, time.stop, steps + 1)
     stop = time.stop if time.stop is not None else (2.0 if time.cycles is None else time.cycles) * period
-    a_cycle = max(4, int(np.ceil(period / time.dt - 1e-9)))
+    a_cycle = max(LEAST_SAMPLES, int(np.ceil(period / time.dt - 1e-9)))
     step = period / a_cycle
+    _bounded(stop / step)
     return np.asarray(np.arange(int(np.floor(stop / step + 1e-9)) + 1) * step, dtype=np.float64)
+
+
+def _bounded(samples: float) -> None:
+    if samples > MOST_SAMPLES:
+        raise InputError(f"time.dt: {samples:.3g} samples are more than the {MOST_SAMPLES} allowed.")
 
 
 def plan_mission(mission: Mission) -> Motion:
@@ -157,6 +167,7 @@ def run(
         mission = load_mission(mission, tuple(overrides))
     folder = Path(out) if out is not None else Path("runs") / mission.name
     refuse_existing(folder, force)
+    _needs(simulate and mission.simulate is not None)
     outcome = work(mission, simulate=simulate, compare=compare, progress=progress)
     metrics = metrics_of(outcome)
     progress("writing", 0.0)
@@ -182,12 +193,36 @@ class Result:
         return self.outcome.ok
 
 
+#: everything that a run writes
+WRITTEN = ("report.html", "figures", "motion.csv", "motion.npz", "robot.xml", "metrics.json", "metrics.schema.json",
+           "mission.toml")  # fmt: skip
+
+
 def refuse_existing(path: Path, force: bool) -> None:
-    """InputError where ``path`` exists and may not be replaced."""
-    if path.exists() and not force:
-        raise InputError(f"{path}: exists already; choose another place with --out, or --force to replace it.")
-    if path.exists() and path.is_dir() and not (path / "metrics.json").is_file() and any(path.iterdir()):
-        raise InputError(f"{path}: is not a folder that bodyplan wrote (no metrics.json in it); it is left alone.")
+    """InputError where ``path`` is no place for a run: it exists and may not be replaced, or cannot be written."""
+    if path.is_symlink() or (path.exists() and not path.is_dir()):
+        raise InputError(f"{path}: is a file; --out must name a folder.")
+    if path.exists():
+        foreign = sorted(p.name for p in path.iterdir() if p.name not in WRITTEN)
+        if foreign:
+            raise InputError(f"{path}: holds files that bodyplan did not write ({', '.join(foreign[:5])}); choose another "
+                             "place with --out.")  # fmt: skip
+        if not force:
+            raise InputError(f"{path}: exists already; choose another place with --out, or --force to replace it.")
+    parent = path.absolute().parent
+    while not parent.exists():
+        parent = parent.parent
+    if not parent.is_dir() or not os.access(parent, os.W_OK):
+        raise InputError(f"{path}: cannot be written, {parent} is not a folder that may be written to.")
+
+
+def _needs(simulate: bool) -> None:
+    """MissingExtraError for what a run would miss at its end."""
+    if simulate and find_spec("mujoco") is None:
+        raise MissingExtraError("mujoco", "physics", "simulation (or run with --no-simulate)")
+    for library in ("matplotlib", "plotly"):
+        if find_spec(library) is None:
+            raise MissingExtraError(library, "report", "report.html")
 
 
 def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) -> None:
@@ -198,12 +233,16 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
     scratch = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     try:
         motion = outcome.motion
-        for name in ("motion.csv", "motion.npz", "robot.xml"):
+        names = ("motion.csv", "motion.npz", "robot.xml")
+        for name in names if find_spec("mujoco") is not None else names[:2]:
             motion.save(scratch / name)
+        (scratch / "metrics.schema.json").write_text(
+            json.dumps(Metrics.model_json_schema(), indent=2) + "\n", encoding="utf-8"
+        )
         (scratch / "metrics.json").write_text(
             json.dumps(metrics.model_dump(), indent=2, allow_nan=False) + "\n", encoding="utf-8"
         )
-        (scratch / "mission.toml").write_text(_mission_text(outcome), encoding="utf-8")
+        (scratch / "mission.toml").write_text(outcome.mission_text, encoding="utf-8")
         write_report(outcome, scratch)
         scratch.chmod(0o755)
         if folder.exists():
@@ -216,10 +255,3 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
             scratch.replace(folder)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _mission_text(outcome: Outcome) -> str:
-    if not outcome.overrides:
-        return outcome.mission_text
-    lines = "".join(f"#   --set {item}\n" for item in outcome.overrides)
-    return f"# Run with these changes:\n{lines}\n{outcome.mission_text}"

@@ -32,6 +32,7 @@ class Claim:
       ``pose`` (T, 3) x, y, heading of the curve in the world, ``tolerance`` m.
     * ``periodic``: after ``period`` s the joints repeat and the base is moved by ``advance`` (3,) m and
       ``turn`` rad.
+    * ``on_floor``: every capsule and sphere touches the floor all the time, to ``tolerance`` m.
     * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).
     """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -40,10 +41,13 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
     """
     unit = SI_UNITS[dimension]
     if isinstance(value, bool):
-        raise InputError(f"{field}: expected a {dimension} such as {_example(dimension)}, got {value!r}.")
+        raise InputError(f"{field}: expected {_named(dimension)} such as {_example(dimension)}, got {value!r}.")
     if isinstance(value, (int, float, np.integer, np.floating)):
         out = float(value)
     elif isinstance(value, str):
+        if not _QUANTITY.fullmatch(value):
+            raise InputError(f"{field}: {value!r} is not {_named(dimension)}; write a number in {unit or 'no unit'} or a "
+                             f"text such as {_example(dimension)}.")  # fmt: skip
         import pint
 
         try:
@@ -52,14 +56,26 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
             out = float(quantity.to(unit or "dimensionless").magnitude)
         except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:
             raise InputError(
-                f"{field}: {value!r} is not a {dimension}; write a number in {unit or 'no unit'} or a text "
+                f"{field}: {value!r} is not {_named(dimension)}; write a number in {unit or 'no unit'} or a text "
                 f"such as {_example(dimension)}."
             ) from error
     else:
-        raise InputError(f"{field}: expected a {dimension} such as {_example(dimension)}, got {value!r}.")
+        raise InputError(f"{field}: expected {_named(dimension)} such as {_example(dimension)}, got {value!r}.")
     if not np.isfinite(out):
         raise InputError(f"{field}: must be finite, got {value!r}.")
     return out
+
+
+#: a number and a unit: nothing that pint would have to compute
+_QUANTITY = re.compile(
+    r"\s*[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,3})?\s*"
+    r"(1?\s*/?\s*[A-Za-z\u00b5\u03bc\u00b0%]{1,20}((\*\*|\^)-?\d)?(\s*[*/ \u00b7]\s*[A-Za-z\u00b5\u03bc\u00b0]{1,20}((\*\*|\^)-?\d)?){0,5})?\s*"
+)
+
+
+def _named(dimension: str) -> str:
+    words = dimension.replace("_", " ")
+    return f"an {words}" if words[0] in "aeiou" else f"a {words}"
 
 
 def _example(dimension: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from bodyplan.check import body
 from bodyplan.check.claims import test_claim
 from bodyplan.check.report import Line, Report
+from bodyplan.errors import InputError
 from bodyplan.motion import Motion
 
 __all__ = ["Line", "Report", "check"]
@@ -14,6 +15,8 @@ __all__ = ["Line", "Report", "check"]
 
 def check(motion: Motion) -> Report:
     """Test a motion and everything it claims. Returns a :class:`Report`, one line a test; nothing raises."""
+    if not isinstance(motion, Motion):
+        raise InputError(f"motion: expected a Motion, got {motion!r}.")
     positions = motion.robot.forward(motion.q, motion.base).positions
     lines: list[Line | None] = [
         body.solved(motion),
@@ -21,8 +24,11 @@ def check(motion: Motion) -> Report:
         body.link_lengths(motion, positions),
     ]
     lines += _gathered([test_claim(motion, positions, claim) for claim in motion.claims])
-    lines += [body.rates_agree(motion), *body.joint_limits(motion), body.self_clearance(motion)]
-    lines += body.ground_clearance(motion)
+    lines += [*body.rates_agree(motion), *body.joint_limits(motion), body.self_clearance(motion)]
+    try:
+        lines += body.ground_clearance(motion)
+    except InputError as error:  # off the map
+        lines.append(Line("on the ground's map", None, None, "", False, str(error), kind="ground"))
     return Report(tuple(line for line in lines if line is not None))
 
 

@@ -11,10 +11,12 @@ from bodyplan.errors import Status
 from bodyplan.motion import Motion
 from bodyplan.robot.elements import Row
 
-#: share of the joints' travel that their rates may fail to explain
-RATE_SLACK = 0.02
-#: and as a share of how much they change between samples
-COARSE_SLACK = 0.1
+#: share of a joint's samples whose rate, or acceleration, may disagree with what is around them
+RATE_SLACK, ACCELERATION_SLACK = 0.15, 0.25
+#: how many times the largest difference quotient a rate may be: rates may peak between two samples
+PEAK = 20.0
+#: fewer samples than this cannot tell a wrong rate from one that changes between them
+FEW = 50
 #: slack of lengths and limits
 EXACT = 1e-9
 #: samples times pairs of shapes handled at once
@@ -35,26 +37,37 @@ def plan_residual(motion: Motion) -> Line:
     return Line("residual of the plan", value, limit, "m", value <= limit, kind="residual")
 
 
-def rates_agree(motion: Motion) -> Line:
-    """Between two samples a joint moves at a speed between its rates at both, give or take a quarter of the change
-    its acceleration can make. What falls outside, as a share of all joints' travel; rates may jump, so a single
-    sample proves nothing."""
-    h = np.diff(motion.t)[:, None]
-    mean = np.diff(motion.q, axis=0) / h
-    low, high = np.minimum(motion.qd[:-1], motion.qd[1:]), np.maximum(motion.qd[:-1], motion.qd[1:])
-    bend = 0.25 * h * np.maximum(np.abs(motion.qdd[:-1]), np.abs(motion.qdd[1:]))
-    beyond = np.maximum(np.maximum(low - bend - mean, mean - high - bend), 0.0)
-    travel = float((h * np.abs(mean)).sum())
-    value = float((h * beyond).sum()) / travel if travel > 0.0 else float(np.abs(motion.qd).max(initial=0.0))
-    # what coarse samples cannot show: rates that change from one to the next
-    coarse = float((h * np.abs(high - low)).sum()) / travel if travel > 0.0 else 0.0
-    slack = RATE_SLACK + COARSE_SLACK * coarse
-    passed = value <= slack
-    by_joint = (h * beyond).sum(axis=0)
-    detail = "" if passed or not by_joint.size else f"most at joint {motion.joints[int(by_joint.argmax())]}"
-    return Line(
-        "rates agree with positions, share of the travel that does not", value, slack, "", passed, detail, kind="rates"
-    )
+def rates_agree(motion: Motion) -> list[Line]:
+    """Rates against the positions, and accelerations against the rates, joint by joint.
+
+    A derivative at a sample must lie between the difference quotients on both sides of it, give or take how much those
+    change nearby and a tenth. Jumps are honest, so single samples may lie outside: the value is the share of a joint's
+    moving samples that do, of the worst joint; and no derivative may be PEAK times the largest quotient.
+    """
+    out = []
+    pairs = (("rates agree with positions", motion.q, motion.qd, RATE_SLACK, PEAK),
+             ("accelerations agree with rates", motion.qd, motion.qdd, ACCELERATION_SLACK, np.inf))  # fmt: skip
+    for name, values, claimed, slack, peak in pairs:
+        what = f"{name}, share of samples that do not"
+        quotient = np.diff(values, axis=0) / np.diff(motion.t)[:, None]
+        if len(quotient) < FEW or not quotient.size:
+            out.append(Line(what, None, slack, "", None, "too few samples to tell", kind="rates"))
+            continue
+        change = np.abs(np.diff(quotient, axis=0))
+        change = np.concatenate([change[:1], change, change[-1:]])  # at every sample
+        nearby = np.maximum(change, np.maximum(np.roll(change, 1, axis=0), np.roll(change, -1, axis=0)))
+        before, after = np.concatenate([quotient[:1], quotient]), np.concatenate([quotient, quotient[-1:]])
+        size = np.maximum(np.abs(before), np.abs(after))
+        room = nearby + 0.1 * size
+        off = (claimed < np.minimum(before, after) - room) | (claimed > np.maximum(before, after) + room)
+        largest = float(size.max(initial=0.0))
+        moving = (size > 1e-3 * largest) | (np.abs(claimed) > 1e-3 * largest + EXACT)
+        share = (off & moving).sum(axis=0) / np.maximum(moving.sum(axis=0), 20)
+        joint = int(share.argmax())
+        value, wild = float(share[joint]), float(np.abs(claimed).max()) > peak * largest + EXACT
+        detail = "a rate is far beyond all others" if wild else f"worst: {motion.joints[joint]}"
+        out.append(Line(what, value, slack, "", value <= slack and not wild, detail, kind="rates"))
+    return out
 
 
 def joint_limits(motion: Motion) -> list[Line]:
@@ -79,7 +92,8 @@ def joint_limits(motion: Motion) -> list[Line]:
         )
     rates = motion.robot.rates
     if np.isfinite(rates).any():
-        share = np.abs(motion.qd) / rates
+        moved = np.abs(np.diff(motion.q, axis=0)) / np.diff(motion.t)[:, None]
+        share = np.maximum(np.abs(motion.qd), np.concatenate([moved, moved[-1:]])) / rates
         at = np.unravel_index(int(share.argmax()), share.shape)
         value = float(share[at])
         lines.append(
@@ -211,6 +225,9 @@ def ground_clearance(motion: Motion) -> list[Line]:
     normal_z = motion.ground.normal(points[..., 0], points[..., 1])[..., 2]
     above = (points[..., 2] - motion.ground.height(points[..., 0], points[..., 1])) * normal_z - surface
     lines = [_worst_gap(motion, which, above, "clear of the floor", EXACT)]
+    lies = allowance(motion, "on_floor")
+    if lies is not None:
+        lines.append(_lies(motion, which, above, float(lies["tolerance"])))
     presses = allowance(motion, "presses", {})
     depth = float(presses.get("depth", 0.0))
     gap = motion.ground.clearance(points) - surface
@@ -233,6 +250,14 @@ def ground_clearance(motion: Motion) -> list[Line]:
     elif np.any(np.abs(gap - above) > EXACT):
         lines.append(_worst_gap(motion, which, gap, "clear of walls and ceiling", EXACT))
     return lines
+
+
+def _lies(motion: Motion, which: list[int], above: Array, tolerance: float) -> Line:
+    off = np.abs(above)
+    at = np.unravel_index(int(off.argmax()), off.shape)
+    value = float(off[at])
+    detail = f"farthest: {motion.robot.contacts[which[int(at[1])]].name} at {motion.t[at[0]]:.4g} s"
+    return Line("lies on the floor", value, tolerance, "m", value <= tolerance, detail, kind="on_floor")
 
 
 def _worst_gap(motion: Motion, which: list[int], gap: Array, what: str, allowed: float) -> Line:

@@ -109,7 +109,7 @@ class ConcertinaCurve:
         starts = self._pieces[:, first : first + self.body_modules + 2, pc.START].copy()
         for row, count in zip(starts, self._counts, strict=True):
             row[count - first :] = row[count - first - 1]
-        return starts.reshape(*self.batch, -1)
+        return starts.reshape(*self.batch, starts.shape[1])
 
     def _evaluate(self, x: ArrayLike) -> tuple[Array, Array]:
         xs = finite(x, "x")
@@ -119,7 +119,7 @@ class ConcertinaCurve:
         if self.batch:
             if xs.shape[: len(self.batch)] != self.batch:
                 xs = np.broadcast_to(xs, (*self.batch, *xs.shape))
-            rows = xs.reshape(len(self._counts), -1)
+            rows = xs.reshape(len(self._counts), int(np.prod(xs.shape[len(self.batch) :])))
         else:
             rows = xs.reshape(1, -1)
         y, slope = np.empty(rows.shape), np.empty(rows.shape)
@@ -152,7 +152,7 @@ class ConcertinaCurve:
             raise InputError(f"x: the curve starts at its tail, x = 0, got {xs.min()}.")
         if self.batch and xs.shape[: len(self.batch)] != self.batch:
             xs = np.broadcast_to(xs, (*self.batch, *xs.shape))
-        rows = np.ascontiguousarray(xs.reshape(len(self._counts), -1))
+        rows = np.ascontiguousarray(xs.reshape(len(self._counts), int(np.prod(xs.shape[len(self.batch) :]))))
         out = np.empty(rows.shape)
         _arclengths(rows, self._pieces, self._counts, self.omega, GAUSS_NODES, GAUSS_WEIGHTS, out)
         return out.reshape(xs.shape)

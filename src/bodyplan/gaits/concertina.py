@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -79,16 +79,17 @@ class Concertina(Gait):
         crossing: int = 2,
     ) -> None:
         self.body_modules = whole(body_modules, "body_modules", at_least=1, at_most=200)
+        self.crossing = whole(crossing, "crossing", at_least=1, at_most=100)
         self.gamma_max = number(gamma_max, "gamma_max", above=0.0, below=1.0)
         self.omega = number(omega, "omega", above=0.0)
         self.stretch_time = number(stretch_time, "stretch_time", above=0.0)
         if contraction not in CONTRACTIONS:
             raise UnknownNameError("contraction", contraction, CONTRACTIONS)
         self.contraction = contraction
-        if contraction == "travelling" and self.body_modules % 2:
+        if contraction == "travelling" and (self.body_modules + self.crossing) % 2:
             raise InputError(
                 f"body_modules: must be even for contraction='travelling', got {body_modules}: with an odd number the "
-                "contracted body is not its own reversal and the cycle does not close."
+                "contracted body is not its own reversal and the cycle does not close (an odd crossing swaps even and odd)."
             )
         self.extension = number(extension, "extension", above=0.0, at_most=1.0)
         self.waves = whole(waves, "waves", at_least=1, at_most=20)
@@ -109,7 +110,6 @@ class Concertina(Gait):
             raise InputError(f"warp: must be true or false, got {warp!r}.")
         self.warp = warp
         self.length_unit = None if length_unit is None else number(length_unit, "length_unit", above=0.0)
-        self.crossing = whole(crossing, "crossing", at_least=1, at_most=100)
 
     def to_dict(self) -> dict[str, Any]:
         """The options as JSON types, with ``kind``."""
@@ -133,6 +133,12 @@ class Concertina(Gait):
         if self.rates is not None:
             options["rates"] = list(self.rates)
         return {"kind": self.kind, **options}
+
+    @property
+    def reversal_sign(self) -> float:
+        """+1 where the contracted curve, N_B + crossing half waves, is its own point reflection; -1 where it is its own
+        mirror image (x -> -x)."""
+        return 1.0 if (self.body_modules + self.crossing) % 2 == 0 else -1.0
 
     def body(self, robot: Robot) -> ConcertinaBody:
         """The gait fitted to one robot: unit, contracted pose, sweep and cycle. Raises InputError or SolveError."""
@@ -172,7 +178,7 @@ class Concertina(Gait):
                 f"(its joints miss the planned places by {residual.max():.3g} m)."
             )
         status = np.full(len(t), Status.OK.value if body.tight < 0 else Status.TOO_TIGHT.value, dtype="U24")
-        facts = body.facts(q, qd, qdd)
+        facts = body.facts(q)
         if walls is not None:
             facts["squeeze"] = 2.0 * walls
         return Motion(
@@ -249,7 +255,7 @@ class ConcertinaBody:
             sweep = LiteralSweep(front, contraction)
         else:
             extension = gait.extension if gait.contraction == "travelling" else 1.0
-            sweep = ExtensionSweep(front, back, extension, sign=1.0 if gait.body_modules % 2 == 0 else -1.0)
+            sweep = ExtensionSweep(front, back, extension, sign=gait.reversal_sign)
         constant_rate = gait.contraction == "travelling" or gait.max_joint_rate is not None
         warp = constant_rate if gait.warp is None else gait.warp
         cycle = ExtensionCycle(
@@ -259,10 +265,17 @@ class ConcertinaBody:
         radius = max((c.radius for c in robot.contacts), default=0.0)
         width = float(np.ptp(contracted[:, 1])) * unit + 2.0 * radius
         grid = np.linspace(0.0, stages.total, 65)
-        tight = np.concatenate([front.at(grid).tight, [int(np.asarray(fit.link)[0])]])
-        return cls(gait, snake, unit, lead, contracted, int(tight.max()), width, sweep, cycle)
+        chains = [front, sweep.contraction if isinstance(sweep, LiteralSweep) else back]
+        tight = max(int(chain.at(grid).tight.max()) for chain in chains)
+        if not isinstance(sweep, LiteralSweep):
+            # near-tight links may lie differently read from the head: the cycle would tear
+            tail_first, head_first = (chain.at(grid[:1]).angles[0] for chain in (front, back))
+            apart = np.abs(tail_first - gait.reversal_sign * head_first[::-1])
+            if apart.max() > 1e-9:
+                tight = max(tight, int(apart.argmax()))
+        return cls(gait, snake, unit, lead, contracted, tight, width, sweep, cycle)
 
-    def facts(self, q: Array, qd: Array, qdd: Array) -> dict[str, float]:
+    def facts(self, q: Array) -> dict[str, float]:
         """Numbers of the plan, SI."""
         length = robot_length(self.snake)
         advance = float(self.cycle.advance[0]) * self.unit
@@ -278,12 +291,21 @@ class ConcertinaBody:
             "contracted_length": float(self.contracted[-1, 0]) * self.unit,
             "body_length": length,
             "largest_joint_angle": float(np.abs(q).max(initial=0.0)),
-            "peak_joint_rate": float(np.abs(qd).max(initial=0.0)),
-            "peak_joint_acceleration": float(np.abs(qdd).max(initial=0.0)),
+            **self.peaks,
         }
         if self.gait.contraction == "travelling":
             out["extension_in_flight"] = self.gait.extension * self._gain() * self.unit
         return out
+
+    @cached_property
+    def peaks(self) -> dict[str, float]:
+        """Largest joint rate and acceleration of a whole cycle, on a grid of its own: a plan's samples may miss them."""
+        state = self.cycle.state(np.linspace(0.0, self.cycle.period, 4001)[:-1])
+        scale = np.abs(self.snake.scale)
+        return {
+            "peak_joint_rate": float((np.abs(np.diff(state.rates, axis=1)) / scale).max()),
+            "peak_joint_acceleration": float((np.abs(np.diff(state.accelerations, axis=1)) / scale).max()),
+        }
 
     def _gain(self) -> float:
         assert isinstance(self.sweep, (ExtensionSweep, LiteralSweep))

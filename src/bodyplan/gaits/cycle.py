@@ -104,7 +104,8 @@ class ExtensionCycle:
         edges = [edge for w in self.sweep.windows for edge in (w.start, w.end)]
         places = np.array([self._place(u) for u in (*edges, self.sweep.launch_end, self.sweep.landing_start)])
         folded = np.concatenate([places - k * span for k in range(waves)])
-        folded = np.concatenate([folded, [0.0, span]])[:, None] + np.array([-1e-4, 0.0, 1e-4]) * span
+        if self.blend == "linear":
+            folded = np.concatenate([folded, [0.0, span]])[:, None] + np.array([-1e-4, 0.0, 1e-4]) * span
         folded = folded[(folded > 0.0) & (folded < span)]
         nodes = np.unique(np.concatenate([np.linspace(0.0, span, max(TABLE // waves, 200)), folded]))
         nodes = nodes[np.concatenate([[True], np.diff(nodes) > 1e-9 * span])]
@@ -114,7 +115,7 @@ class ExtensionCycle:
     def _warped(self, nodes: Array, shape: Shape, period: float) -> Clock:
         speeds = _largest_speeds(shape, nodes)
         # a joint that passes a kink of the curve may be fast between two nodes only: look closer where speeds change
-        change = np.abs(np.diff(speeds)) > 0.03 * speeds.max()
+        change = np.abs(np.diff(speeds)) > (0.03 if self.blend == "linear" else np.inf) * speeds.max()
         cells = np.flatnonzero(change | np.roll(change, 1) | np.roll(change, -1))
         inner = (nodes[cells, None] + np.diff(nodes)[cells, None] * np.arange(1, 8) / 8.0).ravel()
         if inner.size:
@@ -161,7 +162,8 @@ class ExtensionCycle:
     def _peak_rate(self) -> float:
         """Largest joint rate, found on a grid and once more around its peaks; PEAK_MARGIN for what lies between."""
         step = self.clock.period / (4 * TABLE)
-        at = np.unique(np.concatenate([np.arange(4 * TABLE) * step, self.clock.times[:-1]]))
+        edges = self.clock.times[:-1, None] + np.array([-1e-7, 0.0, 1e-7]) * self.clock.period
+        at = np.unique(np.concatenate([np.arange(4 * TABLE) * step, edges.ravel() % self.clock.period]))
         peaks = at[np.argsort(self._largest_rates(at))[-8:]]
         around = (peaks[:, None] + np.linspace(-step, step, 41)).ravel() % self.clock.period
         return float(self._largest_rates(np.sort(around)).max()) * PEAK_MARGIN

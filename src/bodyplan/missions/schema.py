@@ -12,13 +12,13 @@ from functools import partial
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, create_model
 
 from bodyplan import gaits
 from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
 from bodyplan.robot.library import snake
 from bodyplan.robot.model import Robot
-from bodyplan.units import to_si
+from bodyplan.units import SI_UNITS, to_si
 
 STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
@@ -90,32 +90,39 @@ def options_model(kind: str, builder: Builder, units: Mapping[str, str]) -> type
     for name, parameter in inspect.signature(builder).parameters.items():
         annotation = _plain(hints.get(name, Any))
         if name in units:
-            annotation = Annotated[annotation, BeforeValidator(partial(_convert, dimension=units[name]))]
+            annotation = Annotated[annotation, *_quantity(units[name])]
         default = ... if parameter.default is inspect.Parameter.empty else parameter.default
         fields[name] = (annotation, default)
     return create_model(f"{kind} options", __config__=STRICT, **fields)
 
 
-def _quantity(dimension: str) -> Any:
-    return BeforeValidator(partial(_convert, dimension=dimension))
+def _quantity(dimension: str) -> tuple[Any, Any]:
+    """Validator of a quantity, and its place in the JSON schema: a number in SI, or a text with a unit."""
+    texts = {"type": ["number", "string", "array", "null"], "description": f"{dimension} in {SI_UNITS[dimension]}, or a "
+             'text with a unit'}  # fmt: skip
+    return BeforeValidator(partial(_convert, dimension=dimension)), WithJsonSchema(texts)
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Time(BaseModel):
-    """``cycles`` of the gait or ``stop`` s, sampled at most ``dt`` s apart (dt is shortened to divide a cycle)."""
+    """``cycles`` of the gait or ``stop`` s, sampled at most ``dt`` s apart (shortened to divide a cycle in 100 or more)."""
 
     model_config = STRICT
     cycles: Annotated[float, Field(gt=0, le=1000)] | None = None
-    stop: Annotated[float, _quantity("time"), Field(gt=0)] | None = None
-    dt: Annotated[float, _quantity("time"), Field(gt=0)] = 0.02
+    stop: Annotated[float, *_quantity("time"), Field(gt=0)] | None = None
+    dt: Annotated[float, *_quantity("time"), Field(gt=0)] = 0.02
 
 
 class FrictionTriple(BaseModel):
     """Coulomb coefficients of a scaly skin on the floor."""
 
     model_config = STRICT
-    forward: Annotated[float, Field(ge=0)]
-    backward: Annotated[float, Field(ge=0)]
-    sideways: Annotated[float, Field(ge=0)]
+    forward: NotNegative
+    backward: NotNegative
+    sideways: NotNegative
 
 
 class Simulate(BaseModel):
@@ -123,11 +130,11 @@ class Simulate(BaseModel):
 
     model_config = STRICT
     cycles: Annotated[int, Field(ge=1, le=1000)] = 3
-    friction: float | FrictionTriple | None = None
-    servo: tuple[float, float] | None = None
-    dt: Annotated[float, _quantity("time"), Field(gt=0)] = 1e-3
-    settle: Annotated[float, _quantity("time"), Field(ge=0)] = 1.0
-    ramp: Annotated[float, _quantity("time"), Field(ge=0)] = 1.0
+    friction: NotNegative | FrictionTriple | None = None
+    servo: tuple[Positive, NotNegative] | None = None
+    dt: Annotated[float, *_quantity("time"), Field(gt=0, le=0.02)] = 1e-3
+    settle: Annotated[float, *_quantity("time"), Field(ge=0, le=1000)] = 1.0
+    ramp: Annotated[float, *_quantity("time"), Field(ge=0, le=1000)] = 1.0
 
 
 class MissionModel(BaseModel):

@@ -123,7 +123,15 @@ def slips_of(
         frames = [motion.robot.frame_index(name) for name in claim.data["frames"]]
         tracks = positions[:, frames]
         stage = str(claim.data.get("stage", claim.label))
-        begin, stop = (time_of(float(claim.data[key]) - float(motion.t[0])) for key in ("start", "end"))
+        start, end = (float(claim.data[key]) - float(motion.t[0]) for key in ("start", "end"))
+        # a window before the first sample comes again a period later; one that is cut in two is left out
+        every = float(claim.data.get("every") or np.inf)
+        if start < -1e-9 and np.isfinite(every):
+            later = np.ceil(-start / every - 1e-9) * every
+            start, end = start + later, end + later
+        if start < -1e-9:
+            continue
+        begin, stop = time_of(max(start, 0.0)), time_of(end)
         for cycle in range(len(planned)):
             t0, t1 = begin + cycle * period, stop + cycle * period
             if t1 > last or t1 <= t0:
