@@ -75,8 +75,10 @@ SPOILED = {
     "accelerations backwards": ({"qdd": lambda qdd: np.negative(qdd, out=qdd)}, {"rates"}),
     "no accelerations": ({"qdd": lambda qdd: qdd.fill(0.0)}, {"rates"}),
     "floating": ({"base": lambda b: b.__setitem__((slice(None), 2), 1.0)}, {"on_floor"}),
-    "turned after a cycle": ({"base": lambda b: b.__setitem__((-1, slice(3, 7)), [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])},
-                             {"periodic"}),
+    "turned after a cycle": (
+        {"base": lambda b: b.__setitem__((-1, slice(3, 7)), [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])},
+        {"periodic"},
+    ),
     "too fast": ({"qd": lambda qd: qd.__setitem__((300, 4), 9.0)}, {"limits"}),
     "beyond a joint limit": ({"q": lambda q: q.__setitem__((10, 4), 2.0)}, {"limits"}),
     "sunk into the floor": ({"base": lambda b: b.__setitem__((slice(None), 2), 0.010)}, {"ground"}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -189,6 +190,9 @@ def _bad_input() -> Iterator[None]:
     except OSError as error:
         typer.echo(f"error: {error.strerror or error}: {error.filename or ''}".rstrip(": "), err=True)
         raise typer.Exit(2) from None
+    except (MemoryError, RecursionError):
+        typer.echo("error: the input is too large or too deeply nested for this machine", err=True)
+        raise typer.Exit(2) from None
     except KeyboardInterrupt:
         typer.echo("stopped; nothing was written", err=True)
         raise typer.Exit(130) from None
@@ -226,6 +230,11 @@ def _progress() -> Iterator[Any]:
         yield show
 
 
+def _say(text: str, **style: Any) -> None:
+    """Styled, unless the user asked for no colour (NO_COLOR)."""
+    typer.secho(text, color=False if os.environ.get("NO_COLOR") else None, **style)
+
+
 def _table(header: list[str], rows: list[list[str]]) -> None:
     from rich.console import Console
     from rich.table import Table
@@ -241,9 +250,9 @@ def _table(header: list[str], rows: list[list[str]]) -> None:
 def _print_checks(report: Any) -> None:
     for line in report:
         colour = {True: None, False: typer.colors.RED, None: typer.colors.YELLOW}[line.passed]
-        typer.secho(str(line), fg=colour)
+        _say(str(line), fg=colour)
     failed = len(report.failures)
-    typer.secho(
+    _say(
         f"{failed} of {len(report.lines)} checks failed" if failed else f"all {len(report.lines)} checks passed",
         bold=True,
     )
@@ -257,10 +266,11 @@ def _summary(result: Result) -> None:
     """One screen: verdict, key figures, the comparison, where the report is."""
     outcome, plan = result.outcome, result.outcome.motion.facts
     report, trial = outcome.report, outcome.trial
-    typer.secho(f"\n{outcome.title}", bold=True)
+    _say(f"\n{outcome.title}", bold=True)
     for line in report.failures:
-        typer.secho(str(line), fg=typer.colors.RED)
+        _say(str(line), fg=typer.colors.RED)
     failed = len(report.failures)
+    warnings = [note.removeprefix("Warning: ") for note in outcome.motion.notes if note.startswith("Warning: ")]
     typer.echo(f"  checks     {len(report.lines) - failed} passed, {failed} failed")
     if "period" in plan and "advance_per_cycle" in plan:
         typer.echo(
@@ -277,9 +287,12 @@ def _summary(result: Result) -> None:
                 f"cost of transport {_figure(row.cost_of_transport, '')}"
             )
         else:
-            typer.secho(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
-        for warning in trial.warnings[:5]:
-            typer.echo(f"  warning    {warning}")
+            _say(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
+        warnings += trial.warnings
+    for warning in warnings[:5]:
+        typer.echo(f"  warning    {warning}")
+    if len(warnings) > 5:
+        typer.echo(f"             and {len(warnings) - 5} more in the report")
     if outcome.others:
         typer.echo("")
         _table(

@@ -260,13 +260,14 @@ def notes_of(gait: Concertina, body: ConcertinaBody, walls: float | None) -> tup
             f"The links are longer than the contracted curve: {body.lead * body.unit * 1e3:.3g} mm of the body "
             "stay straight."
         )
-    if walls is not None:
+    if walls is not None and walls > 0.0:
         notes.append(
-            f"The contracted body is {body.width * 1e3:.4g} mm wide, {abs(walls) * 2e3:.3g} mm "
-            + (
-                "more than the corridor: that squeeze is what grips."
-                if walls > 0.0
-                else "less than the corridor: it does not touch the walls and has nothing to push against."
-            )
+            f"The contracted body is {body.width * 1e3:.4g} mm wide, {walls * 2e3:.3g} mm more than the corridor: that "
+            "squeeze is what grips."
+        )
+    elif walls is not None:
+        notes.append(
+            f"Warning: the contracted body is {body.width * 1e3:.4g} mm wide, {-walls * 2e3:.3g} mm less than the corridor: "
+            "it does not touch the walls and has nothing to push against."
         )
     return tuple(notes)

@@ -56,7 +56,8 @@ def check_size(rows: int, columns: int, where: str) -> None:
 
 
 def _npy(file: Path, height_range: Any, fill: Any) -> Grid:
-    return Grid(np.load(file, allow_pickle=False))
+    # mapped, so that a header cannot claim more than the file holds
+    return Grid(np.array(np.load(file, mmap_mode="r", allow_pickle=False)))
 
 
 def _npz(file: Path, height_range: Any, fill: Any) -> Grid:

@@ -16,6 +16,7 @@ from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.base import Gait
 from bodyplan.ground.base import Ground
 from bodyplan.missions.schema import SECTIONS, MissionModel, Simulate, Time, options_model
+from bodyplan.robot.files import toml_value
 from bodyplan.robot.model import Robot
 
 MAX_BYTES = 1_000_000
@@ -58,12 +59,14 @@ def load_mission(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Mis
         return parse_mission(ready[text], text, f"mission {text}", None, overrides)
     if path.suffix != ".toml" and not path.exists():
         raise UnknownNameError("mission", text, ready, where="no such file, and")
+    if path.is_dir():
+        raise InputError(f"{text or '.'}: is a folder, not a mission file.")
     if not path.is_file():
         raise InputError(f"{path}: no such file.")
     if path.stat().st_size > MAX_BYTES:
         raise InputError(f"{path}: a mission file of more than {MAX_BYTES} bytes is refused.")
     try:
-        content = path.read_text(encoding="utf-8")
+        content = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not a UTF-8 text ({error.reason} at byte {error.start}).") from error
     return parse_mission(content, path.stem, str(path), path.parent, overrides)
@@ -73,7 +76,7 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
     """The mission in a TOML ``text``; ``where`` names it in errors, ``folder`` is what its paths are relative to."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{where}: not valid TOML: {error}.") from error
     for item in overrides:
         _override(data, item)
@@ -92,14 +95,14 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
         builder, units = registry[kind]
         options = source.validate(options_model(kind, builder, units), table, (section,))
         given = {key: getattr(options, key) for key in options.model_fields_set}
-        if (section, "path") in _PATHS and "path" in given and folder is not None:
-            given["path"] = str(folder / given["path"])
+        if (section, "path") in _PATHS and isinstance(given.get("path"), str) and folder is not None:
+            given["path"] = str((folder / given["path"]).resolve())
+            data[section]["path"] = given["path"]
         try:
             built[section] = builder(**given)
         except InputError as error:
             named = error.kind if isinstance(error, UnknownNameError) else str(error)
-            field = re.match(r"(?:\w+\.)?(\w+)", named)
-            key = field.group(1) if field and field.group(1) in table else None
+            key = next((word for word in re.findall(r"\w+", named.partition(":")[0]) if word in table), None)
             place = source.at((section, key) if key else (section,))
             raise InputError(f"{place}: [{section}] {error}") from error
     for other in model.compare:
@@ -115,9 +118,21 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
         model.time,
         model.simulate,
         tuple(model.compare),
-        text,
+        _effective(text, data, folder, overrides),
         tuple(overrides),
     )
+
+
+def _effective(text: str, data: Mapping[str, Any], folder: Path | None, overrides: Sequence[str]) -> str:
+    """The mission as it runs: its own text, or written anew where overrides or relative paths changed it."""
+    if not overrides and not any("path" in data.get(section, {}) for section in SECTIONS):
+        return text
+    lines = [f"# with --set {item}" for item in overrides]
+    lines += [f"{key} = {toml_value(value)}" for key, value in data.items() if not isinstance(value, dict)]
+    for section, table in data.items():
+        if isinstance(table, dict):
+            lines += ["", f"[{section}]", *(f"{key} = {toml_value(value)}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True)

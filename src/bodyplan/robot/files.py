@@ -39,35 +39,38 @@ def read_toml(path: str | os.PathLike[str]) -> Parts:
 
 def write_toml(data: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
     """Write what :meth:`Robot.to_dict` gives; the file appears whole or not at all."""
-    lines = [f"{key} = {_toml(value)}" for key, value in data.items() if not isinstance(value, (list, dict))]
+    lines = [f"{key} = {toml_value(value)}" for key, value in data.items() if not isinstance(value, (list, dict))]
     for key, value in data.items():
         if isinstance(value, dict):
-            lines += ["", f"[{key}]", *(f"{k} = {_toml(v)}" for k, v in value.items())]
+            lines += ["", f"[{key}]", *(f"{k} = {toml_value(v)}" for k, v in value.items())]
         elif isinstance(value, list):
             for item in value:
                 lines += ["", f"[[{key}]]"]
                 for k, v in item.items():
                     nested = isinstance(v, list) and v and isinstance(v[0], dict)
-                    text = "[\n" + "".join(f"  {_toml(entry)},\n" for entry in v) + "]" if nested else _toml(v)
+                    text = (
+                        "[\n" + "".join(f"  {toml_value(entry)},\n" for entry in v) + "]" if nested else toml_value(v)
+                    )
                     lines.append(f"{k} = {text}")
     with replacing(path) as file:
         file.write("\n".join(lines) + "\n")
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """A value of JSON type as TOML, on one line."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, float):
+    if isinstance(value, (int, float)):
         return repr(value)
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_toml_key(k)} = {_toml(v)}" for k, v in value.items()) + " }"
-    return "[" + ", ".join(_toml(v) for v in value) + "]"
+        return "{ " + ", ".join(f"{_toml_key(k)} = {toml_value(v)}" for k, v in value.items()) + " }"
+    return "[" + ", ".join(toml_value(v) for v in value) + "]"
 
 
 def _toml_key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _toml(key)
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else toml_value(key)
 
 
 def read_table(path: str | os.PathLike[str]) -> tuple[str, tuple[Chain, ...]]:
@@ -181,6 +184,8 @@ def _csv_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, list[str]]]:
 def _read(path: str | os.PathLike[str]) -> str:
     file = Path(path)
     try:
+        if file.exists() and not file.is_file():
+            raise InputError(f"{path}: is not a file.")
         if file.stat().st_size > MAX_BYTES:
             raise InputError(f"{path}: larger than {MAX_BYTES // 1_000_000} MB.")
         return file.read_text(encoding="utf-8-sig")
