@@ -28,6 +28,8 @@ def finite(values: ArrayLike, field: str, shape: tuple[int | None, ...] | None =
     Raises InputError with the field, the first bad entry and its index.
     """
     try:
+        if np.iscomplexobj(values):
+            raise TypeError("complex")
         out: Array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{field}: expected numbers, got {values!r}.") from error

@@ -205,8 +205,8 @@ def refuse_existing(path: Path, force: bool) -> None:
     if path.exists():
         foreign = sorted(p.name for p in path.iterdir() if p.name not in WRITTEN)
         if foreign:
-            raise InputError(f"{path}: holds files that bodyplan did not write ({', '.join(foreign[:5])}); choose another "
-                             "place with --out.")  # fmt: skip
+            names = ", ".join(foreign[:5])
+            raise InputError(f"{path}: holds files that bodyplan did not write ({names}); choose another with --out.")
         if not force:
             raise InputError(f"{path}: exists already; choose another place with --out, or --force to replace it.")
     parent = path.absolute().parent

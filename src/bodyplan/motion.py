@@ -172,6 +172,10 @@ class Motion:
     __hash__ = None  # type: ignore[assignment]
 
 
+#: most samples that :func:`times` makes: a mistyped dt should not eat the machine
+MOST_TIMES = 10_000_000
+
+
 def times(start: float, stop: float, dt: float) -> Array:
     """Evenly spaced times from ``start`` to ``stop`` s, both included; the step is the largest that is
     <= ``dt`` (s) and divides the interval."""
@@ -180,6 +184,8 @@ def times(start: float, stop: float, dt: float) -> Array:
     number(start, "start")
     number(stop, "stop", above=start)
     number(dt, "dt", above=0.0)
+    if (stop - start) / dt > MOST_TIMES:
+        raise InputError(f"dt: {(stop - start) / dt:.3g} samples are more than the {MOST_TIMES} allowed.")
     steps = max(1, int(np.ceil((stop - start) / dt * (1.0 - 1e-12))))
     return np.linspace(start, stop, steps + 1)
 

@@ -46,8 +46,7 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
         out = float(value)
     elif isinstance(value, str):
         if not _QUANTITY.fullmatch(value):
-            raise InputError(f"{field}: {value!r} is not {_named(dimension)}; write a number in {unit or 'no unit'} or a "
-                             f"text such as {_example(dimension)}.")  # fmt: skip
+            raise InputError(_wrong(value, dimension, field))
         import pint
 
         try:
@@ -55,10 +54,7 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
             # frequency: pint reads Hz as 1/s, and keeps "rad" dimensionless
             out = float(quantity.to(unit or "dimensionless").magnitude)
         except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:
-            raise InputError(
-                f"{field}: {value!r} is not {_named(dimension)}; write a number in {unit or 'no unit'} or a text "
-                f"such as {_example(dimension)}."
-            ) from error
+            raise InputError(_wrong(value, dimension, field)) from error
     else:
         raise InputError(f"{field}: expected {_named(dimension)} such as {_example(dimension)}, got {value!r}.")
     if not np.isfinite(out):
@@ -67,10 +63,16 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
 
 
 #: a number and a unit: nothing that pint would have to compute
+_WORD = r"[A-Za-z\u00b5\u03bc\u00b0%]{1,20}((\*\*|\^)-?\d)?"
 _QUANTITY = re.compile(
     r"\s*[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,3})?\s*"
-    r"(1?\s*/?\s*[A-Za-z\u00b5\u03bc\u00b0%]{1,20}((\*\*|\^)-?\d)?(\s*[*/ \u00b7]\s*[A-Za-z\u00b5\u03bc\u00b0]{1,20}((\*\*|\^)-?\d)?){0,5})?\s*"
+    rf"((1?\s*/\s*)?{_WORD}(\s*[*/ \u00b7]\s*{_WORD}){{0,5}})?\s*"
 )
+
+
+def _wrong(value: str, dimension: str, field: str) -> str:
+    wanted = f"a number in {SI_UNITS[dimension] or 'no unit'} or a text such as {_example(dimension)}"
+    return f"{field}: {value!r} is not {_named(dimension)}; write {wanted}."
 
 
 def _named(dimension: str) -> str:

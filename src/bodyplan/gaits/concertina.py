@@ -89,7 +89,7 @@ class Concertina(Gait):
         if contraction == "travelling" and (self.body_modules + self.crossing) % 2:
             raise InputError(
                 f"body_modules: must be even for contraction='travelling', got {body_modules}: with an odd number the "
-                "contracted body is not its own reversal and the cycle does not close (an odd crossing swaps even and odd)."
+                "contracted body is not its own reversal and the cycle does not close (odd where crossing is odd)."
             )
         self.extension = number(extension, "extension", above=0.0, at_most=1.0)
         self.waves = whole(waves, "waves", at_least=1, at_most=20)
@@ -299,7 +299,7 @@ class ConcertinaBody:
 
     @cached_property
     def peaks(self) -> dict[str, float]:
-        """Largest joint rate and acceleration of a whole cycle, on a grid of its own: a plan's samples may miss them."""
+        """Largest joint rate and acceleration of a cycle, on a grid of its own: a plan's samples may miss them."""
         state = self.cycle.state(np.linspace(0.0, self.cycle.period, 4001)[:-1])
         scale = np.abs(self.snake.scale)
         return {

@@ -267,7 +267,7 @@ def notes_of(gait: Concertina, body: ConcertinaBody, walls: float | None) -> tup
         )
     elif walls is not None:
         notes.append(
-            f"Warning: the contracted body is {body.width * 1e3:.4g} mm wide, {-walls * 2e3:.3g} mm less than the corridor: "
-            "it does not touch the walls and has nothing to push against."
+            f"Warning: the contracted body is {body.width * 1e3:.4g} mm wide, {-walls * 2e3:.3g} mm less than the "
+            "corridor: it does not touch the walls and has nothing to push against."
         )
     return tuple(notes)

@@ -23,6 +23,9 @@ _LISTED = 4096
 #: mean radius of the Earth in m, for degrees to metres
 _EARTH = 6_371_008.8
 
+#: m; differences of larger heights would overflow or mean nothing
+HIGHEST = 1e9
+
 
 class HeightMap(Field):
     """Ground through heights ``z`` (ny, nx) in m.
@@ -54,6 +57,8 @@ class HeightMap(Field):
         heights = finite(z, "HeightMap.z", (None, None))
         rows, columns = heights.shape
         check_size(rows, columns, "HeightMap.z")
+        if np.abs(heights).max() > HIGHEST:
+            raise InputError(f"HeightMap.z: heights beyond {HIGHEST:g} m are refused, got {np.abs(heights).max():.4g}.")
         dx, dy = pair(cell, "HeightMap.cell")
         self._cell = (number(dx, "HeightMap.cell", above=0.0), number(dy, "HeightMap.cell", above=0.0))
         self._origin = tuple(float(x) for x in finite(origin, "HeightMap.origin", (2,)))

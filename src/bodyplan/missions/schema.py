@@ -98,8 +98,8 @@ def options_model(kind: str, builder: Builder, units: Mapping[str, str]) -> type
 
 def _quantity(dimension: str) -> tuple[Any, Any]:
     """Validator of a quantity, and its place in the JSON schema: a number in SI, or a text with a unit."""
-    texts = {"type": ["number", "string", "array", "null"], "description": f"{dimension} in {SI_UNITS[dimension]}, or a "
-             'text with a unit'}  # fmt: skip
+    about = f"{dimension} in {SI_UNITS[dimension]}, or a text with a unit"
+    texts = {"type": ["number", "string", "array", "null"], "description": about}
     return BeforeValidator(partial(_convert, dimension=dimension)), WithJsonSchema(texts)
 
 
@@ -108,7 +108,7 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Time(BaseModel):
-    """``cycles`` of the gait or ``stop`` s, sampled at most ``dt`` s apart (shortened to divide a cycle in 100 or more)."""
+    """``cycles`` of the gait or ``stop`` s, sampled at most ``dt`` s apart (and 100 times a cycle at least)."""
 
     model_config = STRICT
     cycles: Annotated[float, Field(gt=0, le=1000)] | None = None
