@@ -165,7 +165,7 @@ class ExtensionSweep:
         if not whole and np.any(np.diff(extents) < -1e-12 * extents[-1]):
             worst = grid[int(np.argmin(np.diff(extents)))]
             raise InputError(
-                f"body_modules, omega: the body shortens while it stretches (at {worst / total:.0%} of its stages), and an "
+                f"body_modules, omega: the body shortens while it stretches (at {worst / total:.0%} of its stages); an "
                 "extension wave needs a gain that grows. The folds are too small for the links (use fewer "
                 "body_modules or a smaller omega), or stages overlap too much."
             )
