@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bodyplan.cli import app
+from bodyplan.job import WRITTEN
 from bodyplan.metrics import Metrics
 
 SMALL = [
@@ -76,9 +77,9 @@ def test_run_writes_a_folder(finished):
     assert result.exit_code == 0, result.output
     assert str(out / "report.html") in result.output and "of the planned advance" in result.output
     names = {p.name for p in out.iterdir()}
-    assert {"report.html", "figures", "motion.csv", "motion.npz", "robot.xml", "metrics.json", "mission.toml"} <= names
+    assert set(WRITTEN) == names
     assert not [p for p in out.parent.iterdir() if p.name.startswith(".")]
-    assert "gait.waves=1" in (out / "mission.toml").read_text()
+    assert "waves = 1\n" in (out / "mission.toml").read_text()
 
 
 def test_metrics_follow_their_schema(finished):
@@ -108,6 +109,54 @@ def test_existing_output_is_not_overwritten(finished, tmp_path):
     assert result.exit_code == 2 and (tmp_path / "mine" / "thesis.tex").exists()
 
 
+def test_a_file_in_the_way_is_never_replaced(tmp_path):
+    path = tmp_path / "thesis.tex"
+    path.write_text("precious")
+    for force in ([], ["--force"]):
+        result = bodyplan("run", "concertina", "--out", str(path), "--no-simulate", *force)
+        assert result.exit_code == 2 and "is a file" in result.output and path.read_text() == "precious"
+    result = bodyplan("run", "concertina", "--out", str(path / "x"), "--no-simulate")
+    assert result.exit_code == 2 and "cannot be written" in result.output
+
+
+def test_files_beside_a_run_are_kept(finished):
+    _, out = finished
+    note = out / "notes.txt"
+    note.write_text("precious")
+    result = bodyplan("run", "concertina", "--out", str(out), "--no-simulate", "--force")
+    note.unlink()
+    assert result.exit_code == 2 and "notes.txt" in result.output and (out / "report.html").exists()
+
+
+def test_the_mission_of_a_run_runs_again(finished):
+    _, out = finished
+    again = bodyplan("check", str(out / "mission.toml"))
+    assert again.exit_code == 0, again.output
+    assert "links = 12" in (out / "mission.toml").read_text()
+
+
+def test_without_physics(tmp_path, monkeypatch):
+    from importlib.util import find_spec
+
+    missing = {"mujoco"}
+    monkeypatch.setattr("bodyplan.job.find_spec", lambda name: None if name in missing else find_spec(name))
+    out = tmp_path / "run"
+    result = bodyplan("run", "concertina", "--out", str(out), "--no-simulate", *SMALL)
+    assert result.exit_code == 0 and (out / "motion.csv").exists() and not (out / "robot.xml").exists()
+    refused = bodyplan("run", "concertina", "--out", str(tmp_path / "other"))
+    assert refused.exit_code == 2 and "bodyplan[physics]" in refused.output and "--no-simulate" in refused.output
+    missing.add("plotly")
+    refused = bodyplan("run", "concertina", "--out", str(tmp_path / "other"), "--no-simulate")
+    assert refused.exit_code == 2 and "bodyplan[report]" in refused.output
+
+
+def test_too_wide_a_corridor_is_a_warning(tmp_path):
+    result = bodyplan(
+        "run", "concertina", "--no-simulate", "--set", "ground.width=0.17", "--out", str(tmp_path / "run")
+    )
+    assert result.exit_code == 0 and "does not touch the walls" in result.output
+
+
 def test_check_and_its_exit_codes(finished, tmp_path):
     _, out = finished
     good = bodyplan("check", str(out / "motion.npz"))
@@ -124,6 +173,11 @@ def test_check_and_its_exit_codes(finished, tmp_path):
         (["check", "none.npz"], ["none.npz"]),
         (["export", "concertina", "--to", "urdff"], ["urdff", "csv", "npz", "xml"]),
         (["missions", "concertin"], ["concertina"]),
+        (["check", "concertina", "--set", "time.dt=1e-9"], ["time.dt", "samples"]),
+        (["check", "concertina", "--set", "robot.mass=9**9**9**9 g"], ["robot.mass", "50 g"]),
+        (["check", "concertina", "--set", "simulate.servo=[nan,1]"], ["simulate.servo"]),
+        (["check", "concertina", "--set", "simulate.friction=-1"], ["simulate.friction =", "-1"]),
+        (["check", "/"], ["folder"]),
         (["check", "x.npz", "--set", "a=1"], ["--set"]),
     ],
 )

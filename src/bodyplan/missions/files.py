@@ -175,7 +175,7 @@ class _Source:
 def _named(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str | int]:
     """The parts of an error's place that the user wrote: pydantic also names the branch of a choice of types."""
     branches = {"float", "int", "str", "bool", "none", *(m.__name__ for m in BaseModel.__subclasses__())}
-    return [part for i, part in enumerate(loc) if i == 0 or part not in branches]
+    return [part for i, part in enumerate(loc) if i == 0 or not (part in branches or "-" in str(part))]
 
 
 def _fields_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
