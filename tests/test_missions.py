@@ -76,7 +76,11 @@ def test_times_divide_the_cycle():
         (('"50 mm"', '"50 s"'), 5, ["robot.link_length", "50 s", "length"]),
         (('"50 mm"', '"fifty"'), 5, ["robot.link_length", "fifty"]),
         (('"50 mm"', "-0.05"), 5, ["link_length", "-0.05"]),
-        (('kind = "plane"', 'kind = "plain"'), 10, ["plain", "plane", "corridor", "heightmap", "profile", "surface"]),
+        (
+            ('kind = "plane"', 'kind = "plain"'),
+            10,
+            ["plain", "plane", "corridor", "height_map", "jacksboro", "profile", "surface"],
+        ),
         (('kind = "plane"', ""), 9, ["ground", "kind", "corridor"]),
         (("body_modules = 2", "body_modules = 3"), 8, ["body_modules", "even", "3"]),
         (("body_modules = 2", 'contraction = "mirrored"'), 8, ["contraction", "mirrored", "literal", "travelling"]),

@@ -54,7 +54,8 @@ GAITS: dict[str, tuple[Builder, Mapping[str, str]]] = {kind: (cls, cls.UNITS) fo
 GROUNDS: dict[str, tuple[Builder, Mapping[str, str]]] = {
     "plane": (Plane, {"height": "length"}),
     "surface": (Surface, {"bounds": "length"}),
-    "heightmap": (HeightMap.from_file, {"cell": "length", "origin": "length"}),
+    "height_map": (HeightMap.from_file, {"cell": "length", "origin": "length"}),
+    "jacksboro": (HeightMap.jacksboro, {"size": "length"}),
     "corridor": (Corridor, {"width": "length", "height": "length", "floor": "length"}),
     "profile": (Profile, {"floor": "length", "ceiling": "length"}),
 }
