@@ -12,7 +12,7 @@ import bodyplan as bp
 from _bench import compare, header
 from bodyplan.curves.dynamic import crossing_of
 
-LINKS, LENGTH, MODULES = 26, 0.873938881878, 4
+LINKS, LENGTH, MODULES, BATCH = 26, 0.873938881878, 4, 10_000
 
 
 def python_curve(gammas: np.ndarray, head: float):
@@ -69,7 +69,7 @@ def by_brentq(curves: list) -> np.ndarray:
 
 def main() -> None:
     rng = np.random.default_rng(0)
-    gammas, heads = rng.uniform(0, 0.8, (2000, MODULES)), rng.uniform(0, 0.8, 2000)
+    gammas, heads = rng.uniform(0, 0.8, (BATCH, MODULES)), rng.uniform(0, 0.8, BATCH)
     few = 20
     slow = [python_curve(g, h) for g, h in zip(gammas[:few], heads[:few], strict=True)]
     error = np.abs(
@@ -78,9 +78,9 @@ def main() -> None:
     header(f"{LINKS} links on concertina curves; the two agree to {error:.1e}")
     compare(
         {
-            "bodyplan, batch of 2000 curves (curves built too)": (
+            f"bodyplan, batch of {BATCH} curves (curves built too)": (
                 lambda: bp.links_on_curve(bp.ConcertinaCurve(gammas, heads), LENGTH, LINKS),
-                2000,
+                BATCH,
             ),
             "bodyplan, one curve a call": (
                 lambda: bp.links_on_curve(bp.ConcertinaCurve(gammas[0], heads[0]), LENGTH, LINKS),
