@@ -19,6 +19,8 @@ from bodyplan.simulate.start import CLOSING, Walls
 RUNAWAY = 1e4
 #: time steps whose targets are computed at once
 BLOCK = 1000
+#: share of the records without contact from which on it is worth a warning: stiff contacts chatter for a step
+AIRBORNE = 0.01
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ class Run:
         low, high = robot.limits.T
         for column in np.flatnonzero(np.any((q < low) | (q > high), axis=0)):
             found.append(f"joint {robot.joints[column]!r} is pushed against its limit")
-        if self._airborne:
+        if self._airborne > AIRBORNE * s:
             found.append(f"no contact with the ground for {100.0 * self._airborne / s:.1f} % of the time")
         slack = self.physics.coupling_error(self._qpos[:s])
         if slack > 1e-3:
