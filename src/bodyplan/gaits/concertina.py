@@ -299,13 +299,14 @@ class ConcertinaBody:
 
     @cached_property
     def peaks(self) -> dict[str, float]:
-        """Largest joint rate and acceleration of a cycle, on a grid of its own: a plan's samples may miss them."""
+        """Largest joint rate of a cycle, on a grid of its own (a plan's samples may miss it); and, for the smooth blend,
+        the largest acceleration: with the linear blend rates jump and it has none."""
         state = self.cycle.state(np.linspace(0.0, self.cycle.period, 4001)[:-1])
         scale = np.abs(self.snake.scale)
-        return {
-            "peak_joint_rate": float((np.abs(np.diff(state.rates, axis=1)) / scale).max()),
-            "peak_joint_acceleration": float((np.abs(np.diff(state.accelerations, axis=1)) / scale).max()),
-        }
+        out = {"peak_joint_rate": float((np.abs(np.diff(state.rates, axis=1)) / scale).max())}
+        if self.gait.blend == "smooth":
+            out["peak_joint_acceleration"] = float((np.abs(np.diff(state.accelerations, axis=1)) / scale).max())
+        return out
 
     def _gain(self) -> float:
         assert isinstance(self.sweep, (ExtensionSweep, LiteralSweep))

@@ -16,7 +16,7 @@ from bodyplan.gaits.sweep import Sweep, Window
 #: even nodes of the table behind the time warp, per sweep
 TABLE = 1200
 #: what the largest joint rate may be above the largest one found
-PEAK_MARGIN = 1.002
+PEAK_MARGIN = 1.008
 #: knots per unit of progress of the rounded angles of a smooth blend
 ROUNDING = 24
 #: share of the mean joint speed that softens the warp where the body stands still for an instant
