@@ -299,7 +299,7 @@ class ConcertinaBody:
 
     @cached_property
     def peaks(self) -> dict[str, float]:
-        """Largest joint rate of a cycle, on a grid of its own (a plan's samples may miss it); and, for the smooth blend,
+        """Largest joint rate of a cycle, on a grid of its own (samples may miss it); and, for the smooth blend,
         the largest acceleration: with the linear blend rates jump and it has none."""
         state = self.cycle.state(np.linspace(0.0, self.cycle.period, 4001)[:-1])
         scale = np.abs(self.snake.scale)
