@@ -53,10 +53,6 @@ class Comparison:
             trial.status,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """JSON types."""
-        return dict(vars(self))
-
 
 @dataclass(frozen=True)
 class Variant:
@@ -75,10 +71,6 @@ class Variant:
         """Measured on a motion with even samples."""
         rate, acceleration = five_point_rates(motion)
         return cls(label, *(float(np.abs(a).max(initial=0.0)) for a in (motion.qd, motion.qdd, rate, acceleration)))
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON types."""
-        return dict(vars(self))
 
 
 def five_point_rates(motion: Motion) -> tuple[Any, Any]:
