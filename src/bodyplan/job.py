@@ -65,7 +65,7 @@ def plan_mission(mission: Mission) -> Motion:
 
 
 def simulate_mission(mission: Mission, motion: Motion, progress: Callable[[float], None] | None = None) -> Any:
-    """The mission's trial, or None where the mission has ``simulate = false``."""
+    """The mission's trial, or None where it has no settings for the physics."""
     settings = mission.simulate
     if settings is None:
         return None

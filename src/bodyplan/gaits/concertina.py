@@ -172,7 +172,7 @@ class Concertina(Gait):
         frames = [robot.frame_index(name) for name in snake.frames]
         made = robot.forward(q, base).positions[:, frames, :2]
         residual = np.linalg.norm(made - points, axis=-1).max(axis=1)
-        if residual.max() > 1e-6 * robot_length(snake):
+        if residual.max() > 1e-6 * snake.length:
             raise InputError(
                 f"Concertina: needs straight links between yaw joints; {robot.name!r} bends otherwise "
                 f"(its joints miss the planned places by {residual.max():.3g} m)."
@@ -262,7 +262,7 @@ class ConcertinaBody:
             sweep, lengths, gait.waves, 2.0 * gait.stretch_time, gait.max_joint_rate, warp, gait.blend
         )
         contracted = fit.points[0]
-        radius = max((c.radius for c in robot.contacts), default=0.0)
+        radius = _radius(robot)
         width = float(np.ptp(contracted[:, 1])) * unit + 2.0 * radius
         grid = np.linspace(0.0, stages.total, 65)
         chains = [front, sweep.contraction if isinstance(sweep, LiteralSweep) else back]
@@ -277,7 +277,7 @@ class ConcertinaBody:
 
     def facts(self, q: Array) -> dict[str, float]:
         """Numbers of the plan, SI."""
-        length = robot_length(self.snake)
+        length = self.snake.length
         advance = float(self.cycle.advance[0]) * self.unit
         out = {
             "period": self.cycle.period,
@@ -286,7 +286,7 @@ class ConcertinaBody:
             "advance_per_body_length": advance / length,
             "speed": advance / self.cycle.period,
             "length_unit": self.unit,
-            "full_gain": self._gain() * self.unit,
+            "full_gain": self.sweep.gain * self.unit,
             "contracted_width": self.width,
             "contracted_length": float(self.contracted[-1, 0]) * self.unit,
             "body_length": length,
@@ -294,7 +294,7 @@ class ConcertinaBody:
             **self.peaks,
         }
         if self.gait.contraction == "travelling":
-            out["extension_in_flight"] = self.gait.extension * self._gain() * self.unit
+            out["extension_in_flight"] = self.gait.extension * self.sweep.gain * self.unit
         return out
 
     @cached_property
@@ -308,19 +308,14 @@ class ConcertinaBody:
             out["peak_joint_acceleration"] = float((np.abs(np.diff(state.accelerations, axis=1)) / scale).max())
         return out
 
-    def _gain(self) -> float:
-        assert isinstance(self.sweep, (ExtensionSweep, LiteralSweep))
-        return self.sweep.gain
-
 
 @lru_cache(maxsize=8)
 def _fitted(gait: Concertina, robot: Robot) -> ConcertinaBody:
     return ConcertinaBody.of(gait, robot)
 
 
-def robot_length(snake: PlanarSnake) -> float:
-    """Length of the straight snake, m."""
-    return float(snake.lengths.sum())
+def _radius(robot: Robot) -> float:
+    return max((c.radius for c in robot.contacts), default=0.0)
 
 
 def _wall_overlap(robot: Robot, ground: Ground, joints: Array) -> float | None:
@@ -330,7 +325,7 @@ def _wall_overlap(robot: Robot, ground: Ground, joints: Array) -> float | None:
     """
     if not isinstance(ground, Corridor):
         return None
-    radius = max((c.radius for c in robot.contacts), default=0.0)
+    radius = _radius(robot)
     reach = float(np.abs(joints[..., 1]).max())
     if reach >= 0.5 * ground.width:
         raise InputError(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.gaits.cycle import CycleState
 from bodyplan.gaits.stretching import StretchingBody
-from bodyplan.gaits.sweep import LiteralSweep, Sweep, Window
+from bodyplan.gaits.sweep import ExtensionSweep, LiteralSweep, Sweep, Window
 from bodyplan.motion import Claim
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def _on_curve(body: ConcertinaBody, state: CycleState, tail: Array, joints: Arra
         _curve_claim(
             body,
             "joints on the stretching curve",
-            body_of(sweep, "front"),
+            sweep.front,
             launching,
             u[launching] + total,
             start,
@@ -71,14 +71,14 @@ def _on_curve(body: ConcertinaBody, state: CycleState, tail: Array, joints: Arra
                 list(body.snake.frames),
             )
         )
-    else:
+    elif isinstance(sweep, ExtensionSweep):
         # read from the head: turned round by pi, and for odd N_B also flipped
         head = np.column_stack([joints[:, -1], np.full(len(u), np.pi)])
         out.append(
             _curve_claim(
                 body,
                 "joints on the contracting curve",
-                body_of(sweep, "back"),
+                sweep.back,
                 landing,
                 total - u[landing],
                 head,
@@ -87,12 +87,6 @@ def _on_curve(body: ConcertinaBody, state: CycleState, tail: Array, joints: Arra
             )
         )
     return [claim for claim in out if len(claim.data["samples"])]
-
-
-def body_of(sweep: Any, which: str) -> StretchingBody:
-    """The front or back chain of a sweep."""
-    found: StretchingBody = getattr(sweep, which)
-    return found
 
 
 def _curve_claim(
@@ -127,7 +121,7 @@ def _curve_claim(
             "frames": frames,
             "tolerance": ROUNDED * float(body.snake.lengths.min())
             if body.gait.blend == "smooth"
-            else 1e-9 * float(body.snake.lengths.sum()),
+            else 1e-9 * body.snake.length,
         },
     )
 
@@ -143,8 +137,7 @@ def _at_rest(body: ConcertinaBody, t: Array, joints: Array) -> list[Claim]:
     nearly = NEARLY_STILL * float(body.snake.lengths.min())
     still = nearly if gait.blend == "smooth" else STILL
     out = []
-    alone = {w.name: w for w in _undisturbed(sweep)}
-    for window, wave, start, end in cycle.windows(tuple(alone.values())):
+    for window, wave, start, end in cycle.windows(_undisturbed(sweep)):
         if window.stretching:
             if wave != gait.waves - 1 or start >= switch - 1e-12:
                 continue

@@ -23,6 +23,11 @@ class PlanarSnake:
     scale: Array
     frames: tuple[str, ...]
 
+    @property
+    def length(self) -> float:
+        """Length of the straight snake, m."""
+        return float(self.lengths.sum())
+
     def joints(self, angles: Array, joint_count: int) -> Array:
         """q (..., joint_count) for absolute angles (..., n) or their derivatives; the other joints stay 0."""
         q = np.zeros((*angles.shape[:-1], joint_count))

@@ -40,7 +40,9 @@ class Window:
 class Sweep(Protocol):
     """A sweep: absolute link angles with derivatives over u in [-T, T], and where it launches and lands."""
 
+    front: StretchingBody
     total: float
+    gain: float
     launch_end: float
     landing_start: float
     windows: tuple[Window, ...]
