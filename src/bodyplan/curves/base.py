@@ -1,0 +1,127 @@
+"""What a body curve is: the shape functions of a dorsal reference curve (paper *acm*, eq. (1)), their integrals and frames.
+
+A curve is given by how its frame turns per unit of arc length: ``tau`` about e_r (forward), ``kappa_p`` about e_p
+(left), ``kappa_y`` about e_y (up). Everything else follows: integrals become joint angles, frames become poses.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array, finite, frozen
+from bodyplan.curves.quadrature import shape_integral
+from bodyplan.errors import InputError
+from bodyplan.spatial import compose, inverse, matrix_from_quaternion, quaternion_from_matrix
+from bodyplan.spatial.frames import curve_frames
+from bodyplan.spatial.poses import IDENTITY
+
+
+class Shape(NamedTuple):
+    """Turns about e_r, e_p, e_y: rad per m (shape functions), rad (their integrals) or rad per m^2 (their slopes)."""
+
+    tau: Array
+    kappa_p: Array
+    kappa_y: Array
+
+
+class BodyCurve(ABC):
+    """A curve of ``length`` m with shape functions of the arc length s (m). Immutable, equal by value.
+
+    Curves with a formula (waves, spirals) go on for all s, also before 0 and beyond ``length``; curves made of pieces
+    or points go on straight there.
+    """
+
+    #: name in mission files and claims
+    kind: ClassVar[str] = ""
+    #: dimension (of ``bodyplan.units``) of every option that has one
+    UNITS: ClassVar[Mapping[str, str]] = {}
+
+    #: length of the body that the curve describes, m
+    length: float
+
+    @abstractmethod
+    def shape(self, s: ArrayLike) -> Shape:
+        """(tau, kappa_p, kappa_y) at s (...,) m, each (...,) rad/m; at a jump the value behind it (larger s)."""
+
+    @abstractmethod
+    def slope(self, s: ArrayLike) -> Shape:
+        """Derivatives of the shape functions with respect to s, each (...,) rad/m^2; jumps count as 0."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The options as JSON types, with ``kind``; :func:`bodyplan.curves.from_dict` gives an equal curve back."""
+
+    @property
+    def start(self) -> Array:
+        """Pose (7,) of the frame at s = 0: the identity, unless the curve lies somewhere by itself."""
+        return frozen(IDENTITY)
+
+    @property
+    def breaks(self) -> Array:
+        """Places (k,) m, ascending, where the shape functions or their slopes jump."""
+        return frozen([])
+
+    @property
+    def period(self) -> float | None:
+        """Length m after which the shape functions repeat; 0 where they are constant, None where they never do."""
+        return None
+
+    @property
+    def twisted(self) -> bool:
+        """True where tau is not 0 everywhere."""
+        return False
+
+    def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
+        """Integrals of the shape functions from a to b m (broadcast), rad; exact, or by quadrature to 1e-13."""
+        return shape_integral(self, a, b)
+
+    def frames(self, s: ArrayLike, start: ArrayLike | None = None, *, tolerance: float = 1e-10) -> tuple[Array, Array]:
+        """Positions (S, 3) m and rotations (S, 3, 3), columns e_r, e_p, e_y of eq. (1), at s (S,) m in any order.
+
+        ``start``: pose (7,) of the frame at s = 0, default ``self.start``. The Lie-group integrator and its step rule
+        are those of :func:`bodyplan.spatial.frames.curve_frames`: error <= ``tolerance`` in position and rotation
+        (between s = 0 and the farthest s), rotations orthonormal to rounding. Raises InputError for a bad argument.
+        """
+        at = finite(s, "s", (None,))
+        begin = self.start if start is None else finite(start, "start", (7,))
+        if not len(at):
+            raise InputError("s: needs at least one value.")
+        places, which = np.unique(np.append(at, 0.0), return_inverse=True)
+        points, rotations = curve_frames(lambda x: np.stack(self.shape(x), axis=-1), places, tolerance=tolerance)
+        zero = which[-1]
+        if zero == 0 and np.array_equal(begin, IDENTITY):
+            return points[which[:-1]], rotations[which[:-1]]
+        here = np.concatenate([points[zero], quaternion_from_matrix(rotations[zero])])
+        back = compose(begin, inverse(here))
+        turn = matrix_from_quaternion(back[3:])
+        return points[which[:-1]] @ turn.T + back[:3], turn @ rotations[which[:-1]]
+
+    def untwisted(self) -> BodyCurve:
+        """The same points with a frame that does not roll (tau = 0): what joints that only bend can follow."""
+        if not self.twisted:
+            return self
+        from bodyplan.curves.untwisted import Untwisted  # it is made of a curve itself
+
+        return Untwisted(self)
+
+    def __add__(self, other: BodyCurve) -> BodyCurve:
+        if not isinstance(other, BodyCurve):
+            return NotImplemented
+        from bodyplan.curves.sums import Sum  # it is made of curves itself
+
+        return Sum((self, other))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, BodyCurve) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(repr(self.to_dict()))
+
+    def __repr__(self) -> str:
+        options = ", ".join(f"{k}={v!r}" for k, v in self.to_dict().items() if k != "kind")
+        return f"{type(self).__name__}({options})"
