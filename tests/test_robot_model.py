@@ -274,7 +274,7 @@ def test_axes(joint: str, axes: str) -> None:
         ({"links": 2.5}, "links"),
         ({"link_length": -0.1}, "link_length"),
         ({"link_length": [0.1, 0.2]}, "link_length"),
-        ({"joint": "double"}, "Valid names: arc, straight"),
+        ({"joint": "triple"}, "Valid names: arc, double, straight"),
         ({"axes": "roll"}, "alternating, pitch, universal, yaw"),
         ({"radius": 0.0}, "radius"),
         ({"mass": -1.0}, "mass"),

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from bodyplan.missions import load_mission
     from bodyplan.motion import Claim, Motion, times
     from bodyplan.plan import plan
-    from bodyplan.robot import Arc, Body, Chain, Contact, Joint, Robot, Row, WheelRadius, snake
+    from bodyplan.robot import Arc, Body, Chain, Contact, Joint, Robot, Row, WheelRadius, acm_l2, snake
     from bodyplan.show import show
     from bodyplan.simulate import Friction, Trial, simulate
 
@@ -59,6 +59,7 @@ _FACE = {
     "Robot": "robot",
     "Row": "robot",
     "WheelRadius": "robot",
+    "acm_l2": "robot",
     "snake": "robot",
     "Corridor": "ground",
     "HeightMap": "ground",

@@ -16,7 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSche
 
 from bodyplan import gaits
 from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
-from bodyplan.robot.library import snake
+from bodyplan.robot.library import acm_l2, snake
 from bodyplan.robot.model import Robot
 from bodyplan.units import SI_UNITS, to_si
 
@@ -47,6 +47,7 @@ def _robot_table(path: str) -> Robot:
 #: kind -> (builder, units of its options)
 ROBOTS: dict[str, tuple[Builder, Mapping[str, str]]] = {
     "snake": (snake, _SNAKE_UNITS),
+    "acm_l2": (acm_l2, _SNAKE_UNITS),
     "file": (_robot_file, {}),
     "table": (_robot_table, {}),
 }
@@ -138,6 +139,33 @@ class Simulate(BaseModel):
     ramp: Annotated[float, *_quantity("time"), Field(ge=0, le=1000)] = 1.0
 
 
+class Grid(BaseModel):
+    """The mission once more at each of ``values`` (SI) of the field ``key``, such as simulate.friction.sideways, and the
+    ready ``missions`` beside it; ``label`` names the field in the report."""
+
+    model_config = STRICT
+    key: Annotated[str, Field(max_length=200)]
+    values: Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=1, max_length=20)]
+    missions: Annotated[list[str], Field(max_length=4)] = []
+    label: Annotated[str, Field(max_length=100)] = ""
+
+
+class PaperRow(BaseModel):
+    """A figure of the paper to set beside ours: ``printed`` in ``unit``; ``ours`` is the metric that stands beside it.
+
+    A metric is ``plan.NAME`` or ``trial.NAME`` as in metrics.json, after ``MISSION:`` that of a mission in ``compare``;
+    ``ours`` is one of them, or the ratio of two: ``trial.speed_m_s / serpentine:trial.speed_m_s``. ``source``: where
+    the paper says it, and what was different there.
+    """
+
+    model_config = STRICT
+    what: Annotated[str, Field(max_length=200)]
+    printed: Annotated[float, Field(allow_inf_nan=False)]
+    unit: Annotated[str, Field(max_length=20)] = ""
+    ours: Annotated[str, Field(max_length=200)]
+    source: Annotated[str, Field(max_length=1000)] = ""
+
+
 class MissionModel(BaseModel):
     """A mission file. ``robot``, ``gait`` and ``ground`` are tables with a ``kind`` and that kind's options."""
 
@@ -150,6 +178,8 @@ class MissionModel(BaseModel):
     time: Time = Time()
     simulate: Simulate | None = Simulate()
     compare: Annotated[list[str], Field(max_length=20)] = []
+    grid: Grid | None = None
+    paper: Annotated[list[PaperRow], Field(max_length=20)] = []
 
 
 def json_schema() -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Robots: D-H rows, arcs and drives; forward kinematics, velocity equation, Jacobians."""
 
 from bodyplan.robot.elements import Arc, Body, Chain, Contact, Joint, Row, WheelRadius
-from bodyplan.robot.library import snake
+from bodyplan.robot.library import acm_l2, snake
 from bodyplan.robot.model import Robot
 from bodyplan.robot.poses import Poses
 from bodyplan.robot.reach import Reach
@@ -17,5 +17,6 @@ __all__ = [
     "Robot",
     "Row",
     "WheelRadius",
+    "acm_l2",
     "snake",
 ]

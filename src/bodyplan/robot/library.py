@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import finite, number, whole
 from bodyplan.errors import InputError, UnknownNameError
-from bodyplan.robot.elements import Arc, Body, Contact, Element, Joint, Row
 from bodyplan.robot.model import Robot
+from bodyplan.robot.snakes import AXES, END_LINK, Units, arcs, doubles, straight
 
 DENSITY = 1000.0  # kg/m^3, water: what a link weighs when nobody says
-AXES = ("yaw", "pitch", "alternating", "universal")
+DEGREE = np.pi / 180.0
+JOINTS = ("straight", "arc", "double")
 MAX_LINKS = 10_000
 
 
@@ -24,6 +26,7 @@ def snake(
     joint: str = "straight",
     *,
     axes: str = "yaw",
+    end_link: float | None = None,
     radius: float | None = None,
     mass: float | None = None,
     limits: Any = None,
@@ -32,70 +35,97 @@ def snake(
     friction: float | None = None,
     name: str | None = None,
 ) -> Robot:
-    """A snake of ``links`` links, frames "link1" (tail) to "linkN" (head) at the front end of each link.
+    """A snake of ``links`` units, frames "link1" (tail) to "linkN" (head) at the front end of each unit.
 
-    The base is the rear end of link 1, x along it, z up; every link frame has x along its link and is upright
-    at zero angles. ``link_length`` in m: one number, or one a link.
+    The base is the rear end of unit 1, x along it, z up; every frame "link1", ... has x along its unit and is
+    upright at zero angles. ``link_length`` in m of a unit: one number, or one a unit.
 
-    ``joint="straight"``: rigid links; joint i turns between links i and i + 1, so N - 1 bends. ``"arc"``:
-    every link is itself a bending segment of constant curvature (paper *acm*), joint i bends link i, N bends.
+    ``joint`` (paper *acm*):
+
+    * "straight": units are rigid links; joint i turns between links i and i + 1, so N - 1 bends.
+    * "arc": every unit is itself a bending segment of constant curvature, joint i bends unit i, N bends.
+    * "double": every unit is a double joint (Fig. 9), joint i bends unit i, N bends: an end link, half of the
+      angles, a middle link, the other half, an end link. ``end_link`` is R_s of eqs. (23), (24), the length of an
+      end link over that of the unit, in (0, 0.5) (default 0.18, the paper's; printed there as "1.6 ~ 1.8" for 0.16
+      to 0.18). Seen from the tail the order is yaw, pitch, pitch, yaw, so that unit i turns by Rz(yaw) half way,
+      Ry(pitch) and Rz(yaw) half way again; the joint coordinate is the whole angle.
 
     ``axes``: "yaw" (about z; joints "yaw1", ...), "pitch" (right-handed about y, nose down; "pitch1", ...),
-    "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...; paper *acm*), "universal" (at every
-    joint yaw, then pitch: "yaw1", "pitch1", ...).
+    "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...), "universal" (at every joint both:
+    "yaw1", "pitch1", ...; a straight joint turns by yaw, then by pitch).
 
-    ``radius`` m of the round body (default 0.3 of the mean link length). ``mass`` kg of one link (default:
-    the volume of its capsule at 1000 kg/m^3), at the middle of the link. ``limits`` (low, high) rad, ``rate``
-    rad/s and ``effort`` N m for every joint. ``friction``: Coulomb coefficient of the belly.
+    ``radius`` m of the round body (default 0.3 of the mean unit length). ``mass`` kg of one unit (default: the
+    volume of its capsule at 1000 kg/m^3), spread evenly along it. ``limits`` (low, high) rad, ``rate`` rad/s and
+    ``effort`` N m for every joint. ``friction``: Coulomb coefficient of the belly.
 
-    Contacts, one a link and named like it: a straight link is a capsule over its whole length. A bending link
-    is a sphere at its front end: that point is on the body's centre line at every bend.
+    Contacts, named like their frame: a straight link is a capsule over its whole length. An arc is a sphere at its
+    front end: that point is on the body's centre line at every bend. Of double joints every rigid part is a capsule
+    over its whole length: "tail" (the first end link, on the base), "middle1" (the middle link of unit 1, whose
+    frame is at its front end and may lie on its side), "link1" (the front end link of unit 1 and the rear one of
+    unit 2, one part), ..., "linkN" (the last end link).
 
-    Raises InputError for a value out of range, UnknownNameError for an unknown joint or axes.
+    Raises InputError for a value out of range and for ``end_link`` with another joint, UnknownNameError for an
+    unknown joint or axes.
     """
     count = whole(links, "links", at_least=1, at_most=MAX_LINKS)
-    if joint not in ("straight", "arc"):
-        raise UnknownNameError("joint", joint, ("straight", "arc"), where="snake")
+    if joint not in JOINTS:
+        raise UnknownNameError("joint", joint, JOINTS, where="snake")
     if axes not in AXES:
         raise UnknownNameError("axes", axes, AXES, where="snake")
+    if end_link is not None and joint != "double":
+        raise InputError(f'end_link: only joint="double" has end links, joint is {joint!r}; got {end_link!r}.')
+    share = number(END_LINK if end_link is None else end_link, "end_link", above=0.0, below=0.5)
     lengths = _lengths(link_length, count)
     thick = number(0.3 * float(lengths.mean()) if radius is None else radius, "radius", above=0.0)
     info = {"limits": limits, "rate": rate, "effort": effort}
 
-    elements: list[Element] = []
-    contacts: list[Contact] = []
-    for i, length in enumerate(lengths.tolist(), start=1):
-        weight = DENSITY * np.pi * thick**2 * (length + 4.0 / 3.0 * thick) if mass is None else mass
-        body = Body(mass=float(weight), com=(-0.5 * length, 0.0, 0.0))
-        frame = f"link{i}"
-        if joint == "arc":
-            elements.append(Arc(length, **_bends(i, axes, info), name=frame, body=body))
-            contacts.append(Contact(frame, frame, "sphere", thick, friction=friction))
-            continue
-        elements.extend(_straight(i - 1, length, axes, info, frame, body))
-        contacts.append(Contact(frame, frame, "capsule", thick, start=(-length, 0.0, 0.0), friction=friction))
-    return Robot.from_rows({"body": elements}, contacts=contacts, name="snake" if name is None else name)
+    weights = DENSITY * np.pi * thick**2 * (lengths + 4.0 / 3.0 * thick)
+    if mass is not None:
+        weights = np.full(count, number(mass, "mass", above=0.0))
+    units = Units(lengths, weights, thick, axes, info, friction)
+    parts = {"straight": straight, "arc": arcs, "double": partial(doubles, end_link=share)}[joint](units)
+    return Robot.from_rows(
+        {"body": parts.elements},
+        contacts=parts.contacts,
+        base_body=parts.base_body,
+        name="snake" if name is None else name,
+    )
 
 
-def _bends(i: int, axes: str, info: dict[str, Any]) -> dict[str, Joint]:
-    """The joints at place ``i`` by the axis they turn about."""
-    yaw = axes in ("yaw", "universal") or (axes == "alternating" and i % 2 == 1)
-    pitch = axes in ("pitch", "universal") or (axes == "alternating" and i % 2 == 0)
-    joints = {"yaw": yaw, "pitch": pitch}
-    return {axis: Joint(f"{axis}{i}", **info) for axis, there in joints.items() if there}
+def acm_l2(
+    joints: int = 9,
+    *,
+    limits: Any = (-75.0 * DEGREE, 75.0 * DEGREE),
+    rate: float | None = None,
+    effort: float | None = 0.5,
+    friction: float | None = None,
+    name: str = "acm_l2",
+) -> Robot:
+    """ACM-L2 (paper *acm*, Table I and section V): a snake of nine two-axis double joints of 78 mm, R_s = 0.18.
 
+    18 joint coordinates "yaw1", "pitch1", ..., each within +-75 deg and with 0.5 N m at most; a round body of 50 mm
+    across; 0.99 kg, 0.11 kg a unit. ``joints``: number of units, for longer and shorter ones. ``limits``, ``rate``,
+    ``effort`` and ``friction`` as in :func:`snake`.
 
-def _straight(i: int, length: float, axes: str, info: dict[str, Any], frame: str, body: Body) -> list[Element]:
-    """Rows of the link behind joint ``i`` (0: the first link, which has none)."""
-    bends = _bends(i, axes, info) if i else {}
-    quarter = 0.5 * np.pi
-    if "pitch" not in bends:
-        return [Row(theta=bends.get("yaw", 0.0), a=length, name=frame, body=body)]
-    # Rx(-90 deg) lays the turning axis z along +y, Rx(+90 deg) sets the link upright again
-    return [
-        Row(theta=bends.get("yaw", 0.0), epsilon=-quarter, name=f"pre{i}"),
-        Row(theta=bends["pitch"], a=length, epsilon=quarter, name=frame, body=body),
-    ]
+    The paper prints a length of 800 mm; nine joints make 702 mm. The other 98 mm are the head and the tail, which do
+    not bend. They are left out, their mass is not: the mass is spread evenly along the nine joints.
+
+    Raises InputError for a value out of range.
+    """
+    return snake(
+        joints,
+        0.078,
+        "double",
+        axes="universal",
+        end_link=0.18,
+        radius=0.025,
+        mass=0.11,
+        limits=limits,
+        rate=rate,
+        effort=effort,
+        friction=friction,
+        name=name,
+    )
 
 
 def _lengths(link_length: ArrayLike, count: int) -> Any:

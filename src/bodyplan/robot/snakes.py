@@ -1,0 +1,123 @@
+"""Units of snakes as elements and contacts: rigid links, arc-shaped joints, double joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.robot.elements import Arc, Body, Contact, Element, Joint, Row
+
+AXES = ("yaw", "pitch", "alternating", "universal")
+QUARTER = 0.5 * np.pi
+END_LINK = 0.18
+
+
+class Parts(NamedTuple):
+    """What a snake is made of."""
+
+    elements: list[Element]
+    contacts: list[Contact]
+    base_body: Body | None = None
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of a snake from tail to head: ``lengths`` (N,) m and ``masses`` (N,) kg, ``radius`` m, ``axes``,
+    properties of every joint (``info``), ``friction`` of the belly."""
+
+    lengths: Array
+    masses: Array
+    radius: float
+    axes: str
+    info: Mapping[str, Any]
+    friction: float | None
+
+    def bends(self, i: int) -> dict[str, Joint]:
+        """The joints at place ``i`` (from 1) by the axis that they turn about."""
+        yaw = self.axes in ("yaw", "universal") or (self.axes == "alternating" and i % 2 == 1)
+        pitch = self.axes in ("pitch", "universal") or (self.axes == "alternating" and i % 2 == 0)
+        joints = {"yaw": yaw, "pitch": pitch}
+        return {axis: Joint(f"{axis}{i}", **self.info) for axis, there in joints.items() if there}
+
+    def capsule(self, name: str, frame: str, behind: float, ahead: float = 0.0) -> Contact:
+        """A capsule along x of a frame, from ``behind`` m behind its origin to ``ahead`` m before it."""
+        start, end = (-behind, 0.0, 0.0), (ahead, 0.0, 0.0)
+        return Contact(name, frame, "capsule", self.radius, start=start, end=end, friction=self.friction)
+
+
+def straight(units: Units) -> Parts:
+    """Rigid links; joint i turns between links i and i + 1."""
+    parts = Parts([], [])
+    for i, (length, mass) in enumerate(_sizes(units), start=1):
+        frame, body = f"link{i}", Body(mass=mass, com=(-0.5 * length, 0.0, 0.0))
+        bends = units.bends(i - 1) if i > 1 else {}
+        if "pitch" in bends:
+            # Rx(-90 deg) lays the turning axis z along +y, Rx(+90 deg) sets the link upright again
+            parts.elements.append(Row(theta=bends.get("yaw", 0.0), epsilon=-QUARTER, name=f"pre{i - 1}"))
+            parts.elements.append(Row(theta=bends["pitch"], a=length, epsilon=QUARTER, name=frame, body=body))
+        else:
+            parts.elements.append(Row(theta=bends.get("yaw", 0.0), a=length, name=frame, body=body))
+        parts.contacts.append(units.capsule(frame, frame, length))
+    return parts
+
+
+def arcs(units: Units) -> Parts:
+    """Every unit bends with constant curvature."""
+    parts = Parts([], [])
+    for i, (length, mass) in enumerate(_sizes(units), start=1):
+        frame, body = f"link{i}", Body(mass=mass, com=(-0.5 * length, 0.0, 0.0))
+        parts.elements.append(Arc(length, **units.bends(i), name=frame, body=body))
+        parts.contacts.append(Contact(frame, frame, "sphere", units.radius, friction=units.friction))
+    return parts
+
+
+def doubles(units: Units, end_link: float) -> Parts:
+    """Double joints (paper *acm*, Figs. 2 and 9): end link, half of the angles, middle link, the other half, end link.
+
+    What lies between the last hinge of a unit and the first one of the next is one rigid part. Masses are spread
+    evenly along each unit.
+    """
+    sizes = _sizes(units)
+    tail, tail_mass = (end_link * x for x in sizes[0])
+    parts = Parts([], [units.capsule("tail", "base", 0.0, tail)], Body(mass=tail_mass, com=(0.5 * tail, 0.0, 0.0)))
+    for i, (length, mass) in enumerate(sizes, start=1):
+        end, middle = end_link * length, (1.0 - 2.0 * end_link) * length
+        inner = Body(mass=(1.0 - 2.0 * end_link) * mass, com=(-0.5 * middle, 0.0, 0.0))
+        # the front end link is one part with the rear end link of the next unit
+        ahead, ahead_mass = (end_link * x for x in sizes[i]) if i < len(sizes) else (0.0, 0.0)
+        end_mass = end_link * mass
+        com = 0.5 * (ahead_mass * ahead - end_mass * end) / (end_mass + ahead_mass)
+        outer = Body(mass=end_mass + ahead_mass, com=(com, 0.0, 0.0))
+        parts.elements.extend(_double(i, end, middle, units.bends(i), inner, outer))
+        parts.contacts.append(units.capsule(f"middle{i}", f"middle{i}", middle))
+        parts.contacts.append(units.capsule(f"link{i}", f"link{i}", end, ahead))
+    return parts
+
+
+def _double(i: int, end: float, middle: float, bends: dict[str, Joint], inner: Body, outer: Body) -> list[Element]:
+    """Rows of one double joint: yaw outside, pitch inside, half of each on both sides of the middle link."""
+    half = {axis: joint.share(0.5) for axis, joint in bends.items()}
+    yaw, pitch = half.get("yaw", 0.0), half.get("pitch", 0.0)
+    rear, mid, front = f"rear{i}", f"middle{i}", f"link{i}"
+    if "pitch" not in half:
+        return [Row(a=end, name=rear), Row(theta=yaw, a=middle, name=mid, body=inner),
+                Row(theta=yaw, a=end, name=front, body=outer)]  # fmt: skip
+    if "yaw" not in half:
+        return [Row(a=end, epsilon=-QUARTER, name=rear), Row(theta=pitch, a=middle, name=mid, body=inner),
+                Row(theta=pitch, a=end, epsilon=QUARTER, name=front, body=outer)]  # fmt: skip
+    return [
+        Row(a=end, name=rear),
+        Row(theta=yaw, epsilon=-QUARTER, name=f"pre{i}"),
+        Row(theta=pitch, a=middle, name=mid, body=inner),
+        Row(theta=pitch, epsilon=QUARTER, name=f"post{i}"),
+        Row(theta=yaw, a=end, name=front, body=outer),
+    ]
+
+
+def _sizes(units: Units) -> list[tuple[float, float]]:
+    """(length m, mass kg) of every unit."""
+    return list(zip(units.lengths.tolist(), units.masses.tolist(), strict=True))
