@@ -6,9 +6,11 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
@@ -18,12 +20,14 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.check import check
-from bodyplan.errors import InputError, MissingExtraError
+from bodyplan.errors import BodyplanError, InputError, MissingExtraError
 from bodyplan.metrics import Metrics, metrics_of
 from bodyplan.missions import Mission, load_mission
+from bodyplan.missions.files import alone, model_section, ready_missions
 from bodyplan.motion import Motion
 from bodyplan.plan import MOST_SAMPLES, plan
-from bodyplan.show.outcome import Comparison, Outcome, Variant
+from bodyplan.show.beside import Beside, beside, check_facts
+from bodyplan.show.outcome import Comparison, Grid, GridPoint, Outcome, Variant, figures_of, no_slip_ratio
 
 #: fewest samples of a cycle: fewer would not show the motion, whatever dt says
 LEAST_SAMPLES = 100
@@ -108,30 +112,85 @@ def mission_times_of(gait: Any, mission: Mission, t: Array) -> Array:
     return np.linspace(0.0, period, steps + 1)
 
 
+def grid_point(text: str, name: str, key: str, value: float) -> GridPoint:
+    """Plan and simulate the mission in ``text`` with the field ``key`` at ``value``. What goes wrong is its status."""
+    try:
+        mission = alone(text, name, (f"{key}={value!r}",))
+        # a field of the physics leaves the plan as it is
+        motion = _plan_of(text, name) if model_section(key) == "simulate" else plan_mission(mission)
+        if not motion.ok:
+            first = int(np.flatnonzero(motion.status != "ok")[0])
+            return GridPoint(name, value, str(motion.status[first]), f"the plan, at t = {motion.t[first]:.4g} s")
+        trial = simulate_mission(mission, motion)
+    except BodyplanError as error:
+        return GridPoint(name, value, "refused", str(error))
+    except Exception as error:  # one point that fails in a way of its own must not cost the others
+        return GridPoint(name, value, "failed", f"{type(error).__name__}: {error}")
+    if not trial.ok:
+        return GridPoint(name, value, trial.status, trial.reason)
+    row = Comparison.of(name, "", motion, trial)
+    return GridPoint(
+        name,
+        value,
+        row.status,
+        "",
+        row.ratio,
+        row.speed,
+        no_slip_ratio(motion, trial),
+        row.peak_torque,
+        row.cost_of_transport,
+        row.slip_angle,
+    )
+
+
+@lru_cache(maxsize=8)
+def _plan_of(text: str, name: str) -> Motion:
+    return plan_mission(alone(text, name))
+
+
+@contextmanager
+def _others(jobs: Sequence[tuple[Any, ...]]) -> Iterator[list[Callable[[], Any]]]:
+    """Calls (function, arguments ...) under way in other processes where there is a second core; each result is
+    asked for by a call."""
+    cores = os.cpu_count() or 1
+    if not jobs or cores == 1:
+        yield [partial(job[0], *job[1:]) for job in jobs]
+        return
+    # the caller works too; in a long list it is done early
+    workers = min(len(jobs), cores - 1 if len(jobs) < 2 * cores else cores)
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        waiting: list[Future[Any]] = [pool.submit(*job) for job in jobs]
+        try:
+            yield [future.result for future in waiting]
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
 def work(mission: Mission, *, simulate: bool = True, compare: bool = True, progress: Progress = _silent) -> Outcome:
     """Plan, check, simulate and compare a mission; nothing is written. See :func:`run`."""
     progress("planning", 0.0)
     motion = plan_mission(mission)
+    for row in mission.paper:
+        check_facts(row.ours, motion.facts, mission.name)
     progress("checking", 0.0)
     report = check(motion)
     variants = _variants(mission, motion.t)
-    others: Sequence[Comparison] = ()
+    others: list[Comparison] = []
+    points: list[GridPoint] = []
     trial = None
     if simulate and mission.simulate is not None:
         names = mission.compare if compare else ()
-        # the other missions run beside this one where there is a second core
-        workers = min(len(names), max(1, (os.cpu_count() or 1) - 1))
-        if names and (os.cpu_count() or 1) > 1:
-            with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-                waiting = [pool.submit(compare_mission, name) for name in names]
-                trial = simulate_mission(mission, motion, lambda part: progress("simulating", part))
-                others = []
-                for i, future in enumerate(waiting):
-                    progress("comparing", i / len(waiting))
-                    others.append(future.result())
-        else:
+        cells = _cells(mission) if compare else []
+        jobs = [(compare_mission, name) for name in names] + [(grid_point, *cell) for cell in cells]
+        with _others(jobs) as results:
             trial = simulate_mission(mission, motion, lambda part: progress("simulating", part))
-            others = [compare_mission(name) for name in names]
+            for i, result in enumerate(results[: len(names)]):
+                progress("comparing", i / len(names))
+                others.append(result())
+            for i, result in enumerate(results[len(names) :]):
+                progress("grid", i / len(cells))
+                points.append(result())
     return Outcome(
         mission.name,
         mission.title,
@@ -143,7 +202,32 @@ def work(mission: Mission, *, simulate: bool = True, compare: bool = True, progr
         trial,
         tuple(others),
         variants,
+        _grid(mission, points),
+        _paper(mission, motion, trial, others),
     )
+
+
+def _cells(mission: Mission) -> list[tuple[str, str, str, float]]:
+    """Arguments of :func:`grid_point` for every mission and value of the grid, this mission first."""
+    grid = mission.grid
+    if grid is None:
+        return []
+    ready = ready_missions()
+    texts = {mission.name: mission.text, **{name: ready[name] for name in grid.missions}}
+    return [(text, name, grid.key, value) for name, text in texts.items() for value in grid.values]
+
+
+def _grid(mission: Mission, points: Sequence[GridPoint]) -> Grid | None:
+    grid = mission.grid
+    if grid is None or not points:
+        return None
+    names = tuple(dict.fromkeys(point.mission for point in points))
+    return Grid(grid.key, grid.label or grid.key, tuple(grid.values), names, tuple(points))
+
+
+def _paper(mission: Mission, motion: Motion, trial: Any, others: Sequence[Comparison]) -> tuple[Beside, ...]:
+    mine = figures_of(motion, trial)
+    return beside(mission.paper, {None: mine, mission.name: mine, **{other.name: other.figures for other in others}})
 
 
 def run(

@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from bodyplan.check import Line
-from bodyplan.show.outcome import Comparison, Outcome, Variant, five_point_gaps
+from bodyplan.show.beside import Beside
+from bodyplan.show.outcome import Comparison, Grid, Outcome, Variant, five_point_gaps
 
 STRICT = ConfigDict(extra="forbid")
 
@@ -35,6 +36,8 @@ class Metrics(BaseModel):
     warnings: list[str]
     compared: list[Comparison]
     variants: list[Variant]
+    grid: Grid | None = None
+    paper: list[Beside] = []
 
 
 def metrics_of(outcome: Outcome) -> Metrics:
@@ -58,4 +61,6 @@ def metrics_of(outcome: Outcome) -> Metrics:
         warnings=[] if trial is None else list(trial.warnings),
         compared=list(outcome.others),
         variants=list(outcome.variants),
+        grid=outcome.grid,
+        paper=list(outcome.paper),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -15,9 +16,10 @@ from pydantic import BaseModel, ValidationError
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.base import Gait
 from bodyplan.ground.base import Ground
-from bodyplan.missions.schema import SECTIONS, MissionModel, Simulate, Time, options_model
+from bodyplan.missions.schema import SECTIONS, Grid, MissionModel, PaperRow, Simulate, Time, options_model
 from bodyplan.robot.files import toml_value
 from bodyplan.robot.model import Robot
+from bodyplan.show.beside import check_row
 
 MAX_BYTES = 1_000_000
 _PATHS = {("robot", "path"), ("ground", "path")}
@@ -38,6 +40,8 @@ class Mission:
     compare: tuple[str, ...]
     text: str
     overrides: tuple[str, ...] = ()
+    grid: Grid | None = None
+    paper: tuple[PaperRow, ...] = ()
 
 
 def ready_missions() -> dict[str, str]:
@@ -82,32 +86,13 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
         _override(data, item)
     source = _Source(text, where, tuple(overrides))
     model = source.validate(MissionModel, data, ())
-    built = {}
-    for section, registry in SECTIONS.items():
-        table = dict(getattr(model, section))
-        kind = table.pop("kind", None)
-        if kind is None:
-            raise InputError(
-                f"{source.at((section,))}: [{section}] needs a kind, one of: {', '.join(sorted(registry))}."
-            )
-        if not isinstance(kind, str) or kind not in registry:
-            raise UnknownNameError(f"{section} kind", kind, registry, where=source.at((section, "kind")))
-        builder, units = registry[kind]
-        options = source.validate(options_model(kind, builder, units), table, (section,))
-        given = {key: getattr(options, key) for key in options.model_fields_set}
-        if (section, "path") in _PATHS and isinstance(given.get("path"), str) and folder is not None:
-            given["path"] = str((folder / given["path"]).resolve())
-            data[section]["path"] = given["path"]
-        try:
-            built[section] = builder(**given)
-        except InputError as error:
-            named = error.kind if isinstance(error, UnknownNameError) else str(error)
-            key = next((word for word in re.findall(r"\w+", named.partition(":")[0]) if word in table), None)
-            place = source.at((section, key) if key else (section,))
-            raise InputError(f"{place}: [{section}] {error}") from error
+    built = {section: _build(source, model, section, data, folder) for section in SECTIONS}
     for other in model.compare:
         if other not in ready_missions():
             raise UnknownNameError("mission", other, ready_missions(), where=f"{source.at(('compare',))}: compare")
+    _check_paper(source, model, name)
+    if model.grid is not None:
+        _check_grid(source, model.grid, data, folder, name)
     return Mission(
         name,
         model.title,
@@ -120,15 +105,92 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
         tuple(model.compare),
         _effective(text, data, folder, overrides),
         tuple(overrides),
+        model.grid,
+        tuple(model.paper),
     )
+
+
+def _build(source: _Source, model: MissionModel, section: str, data: dict[str, Any], folder: Path | None) -> Any:
+    """The robot, gait or ground of a mission; a relative path in ``data`` is made absolute."""
+    registry = SECTIONS[section]
+    table = dict(getattr(model, section))
+    kind = table.pop("kind", None)
+    if kind is None:
+        raise InputError(f"{source.at((section,))}: [{section}] needs a kind, one of: {', '.join(sorted(registry))}.")
+    if not isinstance(kind, str) or kind not in registry:
+        raise UnknownNameError(f"{section} kind", kind, registry, where=source.at((section, "kind")))
+    builder, units = registry[kind]
+    options = source.validate(options_model(kind, builder, units), table, (section,))
+    given = {key: getattr(options, key) for key in options.model_fields_set}
+    if (section, "path") in _PATHS and isinstance(given.get("path"), str) and folder is not None:
+        given["path"] = str((folder / given["path"]).resolve())
+        data[section]["path"] = given["path"]
+    try:
+        return builder(**given)
+    except InputError as error:
+        named = error.kind if isinstance(error, UnknownNameError) else str(error)
+        key = next((word for word in re.findall(r"\w+", named.partition(":")[0]) if word in table), None)
+        place = source.at((section, key) if key else (section,))
+        raise InputError(f"{place}: [{section}] {error}") from error
+
+
+def _check_paper(source: _Source, model: MissionModel, name: str) -> None:
+    """The rows of ``paper`` name units and metrics that exist."""
+    cycles = 1 if model.simulate is None else model.simulate.cycles
+    for i, row in enumerate(model.paper):
+        try:
+            check_row(row.ours, row.unit, name, model.compare, cycles)
+        except InputError as error:
+            field = "unit" if str(error).startswith("unit") else "ours"
+            raise InputError(f"{source.at(('paper', i, field))}: paper: {error}") from error
+
+
+def _check_grid(source: _Source, grid: Grid, data: dict[str, Any], folder: Path | None, name: str) -> None:
+    """The field of the grid may take every value, here and in the missions run beside."""
+    ready = ready_missions()
+    for other in grid.missions:
+        if other not in ready or other == name:
+            others = set(ready) - {name}
+            raise UnknownNameError("mission", other, others, where=f"{source.at(('grid', 'missions'))}: grid.missions")
+    if model_section(grid.key) in ("grid", "compare", "paper", "title", "about"):
+        raise InputError(f"{source.at(('grid', 'key'))}: grid.key = {grid.key!r}: nothing to vary; name a number.")
+    for value in grid.values:
+        item = f"{grid.key}={value!r}"
+        try:
+            changed = copy.deepcopy(data)
+            _override(changed, item)
+            there = _Source(source.text, source.where, (*source.overrides, item))
+            model = there.validate(MissionModel, changed, ())
+            if model_section(grid.key) in SECTIONS:
+                _build(there, model, model_section(grid.key), changed, folder)
+            for other in grid.missions:
+                alone(ready[other], other, (item,))
+        except InputError as error:
+            raise InputError(f"{source.at(('grid', 'key'))}: grid: {error}") from error
+
+
+def model_section(key: str) -> str:
+    """The section of a mission that a dotted key is in."""
+    return key.partition(".")[0].strip()
+
+
+def alone(text: str, name: str, overrides: Sequence[str] = ()) -> Mission:
+    """The mission in ``text`` (its paths absolute) without its comparisons and its grid."""
+    data = tomllib.loads(text)
+    kept = {k: v for k, v in data.items() if k not in ("grid", "compare", "paper")}
+    return parse_mission(_written(kept, []), name, f"mission {name}", None, overrides)
 
 
 def _effective(text: str, data: Mapping[str, Any], folder: Path | None, overrides: Sequence[str]) -> str:
     """The mission as it runs: its own text, or written anew where overrides or relative paths changed it."""
     if not overrides and not any("path" in data.get(section, {}) for section in SECTIONS):
         return text
-    lines = [f"# with --set {item}" for item in overrides]
-    lines += [f"{key} = {toml_value(value)}" for key, value in data.items() if not isinstance(value, dict)]
+    return _written(data, [f"# with --set {item}" for item in overrides])
+
+
+def _written(data: Mapping[str, Any], head: Sequence[str]) -> str:
+    """A mission as TOML, under lines of comment."""
+    lines = [*head, *(f"{key} = {toml_value(value)}" for key, value in data.items() if not isinstance(value, dict))]
     for section, table in data.items():
         if isinstance(table, dict):
             lines += ["", f"[{section}]", *(f"{key} = {toml_value(value)}" for key, value in table.items())]
@@ -150,7 +212,7 @@ class _Source:
             key = item.partition("=")[0].strip()
             if key and (dotted == key or dotted.startswith(key + ".")):
                 return f"--set {item}"
-        line = _line_of(self.text, [str(p) for p in place if not isinstance(p, int)])
+        line = _line_of(self.text, place)
         return self.where if line is None else f"{self.where}, line {line}"
 
     def validate(self, model: type[BaseModel], data: Mapping[str, Any], section: tuple[str, ...]) -> Any:
@@ -192,15 +254,21 @@ def _fields_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
     return list(current.model_fields)
 
 
-def _line_of(text: str, place: Sequence[str]) -> int | None:
-    """Line (from 1) that sets a field, else of its table's header; None where neither is found."""
-    header, key = ".".join(place[:-1]), place[-1] if place else ""
-    current, best = "", None
+def _line_of(text: str, place: Sequence[str | int]) -> int | None:
+    """Line (from 1) that sets a field, else of its table's header; None where neither is found. A number in the place
+    says which of several [[tables]] of one name."""
+    names = [p for p in place if isinstance(p, str)]
+    which = next((p for p in place if isinstance(p, int)), 0)
+    header, key = ".".join(names[:-1]), names[-1] if names else ""
+    current, best, seen = "", None, -1
     for i, line in enumerate(text.splitlines(), start=1):
-        table = re.match(r"\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$", line)
+        table = re.match(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(#.*)?$", line)
         if table:
-            current = table.group(1).replace(" ", "")
-            if current == ".".join(place):
+            current = table.group(2).replace(" ", "")
+            if table.group(1) == "[[" and current == header:
+                seen += 1
+                current = header if seen == which else ""
+            if current == ".".join(names) and table.group(1) == "[":
                 return i
             if current == header:
                 best = i

@@ -140,8 +140,8 @@ class Simulate(BaseModel):
 
 
 class Grid(BaseModel):
-    """The mission once more at each of ``values`` (SI) of the field ``key``, such as simulate.friction.sideways, and the
-    ready ``missions`` beside it; ``label`` names the field in the report."""
+    """The mission once more at each of ``values`` (SI) of the field ``key``, such as simulate.friction.sideways, and
+    the ready ``missions`` beside it; ``label`` names the field in the report."""
 
     model_config = STRICT
     key: Annotated[str, Field(max_length=200)]

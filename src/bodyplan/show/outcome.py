@@ -4,7 +4,8 @@ gait."""
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib import import_module  # the package itself is above every floor and is looked up by name
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from bodyplan.check import Report
 from bodyplan.motion import Motion
 from bodyplan.rates import five_point
+from bodyplan.show.beside import Beside
 
 if TYPE_CHECKING:
     from bodyplan.simulate import Trial
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Figures of another mission, run the same way: advance executed / planned, speeds in m/s, torque in N
-    m."""
+    """Figures of another mission, run the same way: advance executed / planned, speeds in m/s, torque in N m, slip
+    angle in rad, executed over no-slip speed; ``figures``: every number of :func:`figures_of`."""
 
     name: str
     title: str
@@ -32,14 +34,18 @@ class Comparison:
     peak_torque: float | None
     cost_of_transport: float | None
     status: str
+    slip_angle: float | None = None
+    no_slip_ratio: float | None = None
+    figures: Mapping[str, float | None] = field(default_factory=dict)
 
     @classmethod
     def of(cls, name: str, title: str, motion: Motion, trial: Trial | None) -> Comparison:
         """The figures of a planned and simulated motion."""
         rate = float(np.abs(motion.qd).max(initial=0.0))
         planned = motion.facts.get("speed")
+        figures = figures_of(motion, trial)
         if trial is None:
-            return cls(name, title, None, None, planned, rate, None, None, "not simulated")
+            return cls(name, title, None, None, planned, rate, None, None, "not simulated", figures=figures)
         metrics: dict[str, Any] = dict(trial.metrics())
         return cls(
             name,
@@ -51,7 +57,60 @@ class Comparison:
             metrics.get("peak_torque_Nm"),
             metrics["cost_of_transport"],
             trial.status,
+            metrics.get("slip_angle_rad"),
+            no_slip_ratio(motion, trial),
+            figures,
         )
+
+
+def figures_of(motion: Motion, trial: Trial | None) -> dict[str, float | None]:
+    """Every number of a run by name: "plan." and a fact of the planner, "trial." and a measure of the physics (SI)."""
+    out: dict[str, float | None] = {f"plan.{name}": value for name, value in motion.facts.items()}
+    for name, value in ({} if trial is None else trial.metrics()).items():
+        if not isinstance(value, str):
+            out[f"trial.{name}"] = None if value is None else float(value)
+    return out
+
+
+def no_slip_ratio(motion: Motion, trial: Trial | None) -> float | None:
+    """Executed speed over the speed of a body that does not slip; None where the plan names none (its fact
+    ``no_slip_speed``) or nothing was executed."""
+    speed = motion.facts.get("no_slip_speed")
+    if trial is None or trial.speed is None or not speed:
+        return None
+    return trial.speed / speed
+
+
+@dataclass(frozen=True)
+class GridPoint:
+    """One mission at one value of a grid: figures as those of a :class:`Comparison`; ``status`` "ok", that of the plan
+    or of the physics, or "refused", with the ``reason``."""
+
+    mission: str
+    value: float
+    status: str
+    reason: str = ""
+    advance_ratio: float | None = None
+    speed: float | None = None
+    no_slip_ratio: float | None = None
+    peak_torque: float | None = None
+    cost_of_transport: float | None = None
+    slip_angle: float | None = None
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Missions at each of ``values`` of the field ``key``; ``points`` mission by mission, this one first."""
+
+    key: str
+    label: str
+    values: tuple[float, ...]
+    missions: tuple[str, ...]
+    points: tuple[GridPoint, ...]
+
+    def of(self, mission: str) -> list[GridPoint]:
+        """The points of one mission, in the order of the values."""
+        return [point for point in self.points if point.mission == mission]
 
 
 @dataclass(frozen=True)
@@ -110,6 +169,8 @@ class Outcome:
     trial: Trial | None = None
     others: tuple[Comparison, ...] = ()
     variants: tuple[Variant, ...] = ()
+    grid: Grid | None = None
+    paper: tuple[Beside, ...] = ()
 
     @property
     def ok(self) -> bool:

@@ -1,0 +1,144 @@
+"""Figures that a paper prints, and the metric of a run that stands beside each: ``trial.speed_m_s``, or a ratio of
+two."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.simulate.trial import Trial
+from bodyplan.units import SI_UNITS, to_si
+
+GROUPS = ("plan", "trial")
+_METRIC = re.compile(r"(?:(?P<mission>[^\s:/]+):)?(?P<group>\w+)\.(?P<name>\w+)")
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number of a run: ``group`` "plan" (a fact of the planner) or "trial" (a measure of the physics); of the mission
+    named, or of the run itself (None)."""
+
+    mission: str | None
+    group: str
+    name: str
+
+    @property
+    def key(self) -> str:
+        """Its name among :func:`bodyplan.show.outcome.figures_of`."""
+        return f"{self.group}.{self.name}"
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A row of the table: ``printed`` in ``unit``, and ``value`` in the same unit (None where ``problem`` says why)."""
+
+    what: str
+    printed: float
+    unit: str
+    ours: str
+    source: str
+    value: float | None
+    problem: str = ""
+
+
+def metrics_in(ours: str) -> tuple[Metric, ...]:
+    """The one or two metrics of an expression "A" or "A / B". InputError for anything else."""
+    parts = [part.strip() for part in ours.split("/")]
+    found = [_METRIC.fullmatch(part) for part in parts]
+    if len(parts) > 2 or not all(found):
+        raise InputError(
+            f"ours = {ours!r}: write a metric (plan.NAME, trial.NAME, MISSION:trial.NAME), or a ratio A / B of two."
+        )
+    out = tuple(Metric(**match.groupdict()) for match in found if match)
+    for metric in out:
+        if metric.group not in GROUPS:
+            raise UnknownNameError("group of metrics", metric.group, GROUPS, where=f"ours = {ours!r}")
+    return out
+
+
+def check_row(ours: str, unit: str, mission: str, compared: Collection[str], cycles: int) -> None:
+    """InputError or UnknownNameError for a row whose unit or metrics cannot exist in a run of ``mission`` beside
+    ``compared`` ones. Facts of the plan are known after planning only: :func:`check_facts`."""
+    scale_of(unit)
+    for metric in metrics_in(ours):
+        if metric.mission not in (None, mission, *compared):
+            raise UnknownNameError("mission", metric.mission, compared, where=f"ours = {ours!r}: not in compare,")
+        if metric.group == "trial" and metric.name not in (names := trial_names(cycles)):
+            raise UnknownNameError("metric of the trial", metric.name, names, where=f"ours = {ours!r}")
+
+
+def check_facts(ours: str, facts: Collection[str], mission: str) -> None:
+    """UnknownNameError for a fact of the plan that this mission's planner does not give."""
+    for metric in metrics_in(ours):
+        if metric.mission in (None, mission) and metric.group == "plan" and metric.name not in facts:
+            raise UnknownNameError("fact of the plan", metric.name, facts, where=f"paper: ours = {ours!r}")
+
+
+def beside(rows: Sequence[Any], figures: Mapping[str | None, Mapping[str, float | None]]) -> tuple[Beside, ...]:
+    """The rows (with fields what, printed, unit, ours, source) with our values; ``figures`` by mission, None: this
+    one."""
+    out = []
+    for row in rows:
+        values: list[float | None] = []
+        problem = ""
+        for metric in metrics_in(row.ours):
+            known = figures.get(metric.mission)
+            values.append(None if known is None else known.get(metric.key))
+            if known is None:
+                problem = f"{metric.mission} was not run"
+            elif metric.key not in known:
+                near = difflib.get_close_matches(metric.key, known, n=1)
+                problem = f"no {metric.key} there" + (f", but {near[0]}" if near else "")
+            elif known[metric.key] is None:
+                problem = problem or f"{metric.key} has no value"
+        value = None
+        if None not in values:
+            numbers = [float(v) for v in values if v is not None]
+            if len(numbers) == 1:
+                value = numbers[0] / scale_of(row.unit)
+            elif numbers[1] != 0.0:
+                value = numbers[0] / numbers[1] / scale_of(row.unit)
+            else:
+                problem = "divided by zero"
+        out.append(Beside(row.what, row.printed, row.unit, row.ours, row.source, value, problem))
+    return tuple(out)
+
+
+@cache
+def scale_of(unit: str) -> float:
+    """What one ``unit`` is in SI (1 where it is empty). InputError for a text that is no unit."""
+    if not unit.strip():
+        return 1.0
+    for dimension in SI_UNITS:
+        try:
+            return to_si(f"1 {unit}", dimension)
+        except InputError:
+            continue
+    raise InputError(f"unit = {unit!r}: not a unit; write for example mm/s, deg, N*m, or % for a share.")
+
+
+@cache
+def trial_names(cycles: int) -> tuple[str, ...]:
+    """Names of the numbers that a trial of so many cycles has (some of them None in some trials)."""
+    none = np.zeros(0)
+    trial = Trial(
+        joints=("a", "b"),
+        kinds=("angle", "length"),
+        t=none,
+        base=none,
+        q=none,
+        torque=none,
+        com=none,
+        start_time=0.0,
+        period=1.0,
+        cycles=cycles,
+        planned_advance=np.zeros((cycles, 3)),
+    )
+    return tuple(name for name in trial.metrics() if name not in ("status", "reason"))
