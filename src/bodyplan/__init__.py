@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bodyplan import curves, export, fitting, gaits, ground, rates, spatial
     from bodyplan.check import Report, check
-    from bodyplan.curves import ConcertinaCurve
+    from bodyplan.curves import BodyCurve, ConcertinaCurve, Serpenoid, SinusLift, Spiral
     from bodyplan.errors import (
         BodyplanError,
         InputError,
@@ -66,7 +66,11 @@ _FACE = {
     "Plane": "ground",
     "Profile": "ground",
     "Surface": "ground",
+    "BodyCurve": "curves",
     "ConcertinaCurve": "curves",
+    "Serpenoid": "curves",
+    "SinusLift": "curves",
+    "Spiral": "curves",
     "exact_link_length": "fitting",
     "links_on_curve": "fitting",
     "Concertina": "gaits",

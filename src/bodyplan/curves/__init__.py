@@ -5,11 +5,36 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bodyplan.curves.base import BodyCurve, Shape
 from bodyplan.curves.concertina import ConcertinaCurve
+from bodyplan.curves.constant import Constant
 from bodyplan.curves.dynamic import GAMMA_STAR, dynamic_curve, dynamic_slope
+from bodyplan.curves.serpenoid import Serpenoid
+from bodyplan.curves.sinuslift import SinusLift
+from bodyplan.curves.spiral import Spiral
+from bodyplan.curves.sums import Sum
+from bodyplan.curves.tables import KINDS, from_dict
+from bodyplan.curves.untwisted import Untwisted
 from bodyplan.errors import UnknownNameError
 
-__all__ = ["CURVES", "GAMMA_STAR", "ConcertinaCurve", "dynamic_curve", "dynamic_slope", "from_parameters"]
+__all__ = [
+    "CURVES",
+    "GAMMA_STAR",
+    "KINDS",
+    "BodyCurve",
+    "ConcertinaCurve",
+    "Constant",
+    "Serpenoid",
+    "Shape",
+    "SinusLift",
+    "Spiral",
+    "Sum",
+    "Untwisted",
+    "dynamic_curve",
+    "dynamic_slope",
+    "from_dict",
+    "from_parameters",
+]
 
 #: curves that a claim can name
 CURVES = {"concertina": ConcertinaCurve}

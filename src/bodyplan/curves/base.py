@@ -1,4 +1,4 @@
-"""What a body curve is: the shape functions of a dorsal reference curve (paper *acm*, eq. (1)), their integrals and frames.
+"""What a body curve is: the shape functions of a dorsal reference curve (paper *acm*, eq. (1)).
 
 A curve is given by how its frame turns per unit of arc length: ``tau`` about e_r (forward), ``kappa_p`` about e_p
 (left), ``kappa_y`` about e_y (up). Everything else follows: integrals become joint angles, frames become poses.
@@ -13,7 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bodyplan.arrays import Array, finite, frozen
+from bodyplan.arrays import Array, finite, frozen, number
 from bodyplan.curves.quadrature import shape_integral
 from bodyplan.errors import InputError
 from bodyplan.spatial import compose, inverse, matrix_from_quaternion, quaternion_from_matrix
@@ -27,6 +27,16 @@ class Shape(NamedTuple):
     tau: Array
     kappa_p: Array
     kappa_y: Array
+
+
+def unit_pose(pose: ArrayLike, field: str) -> Array:
+    """``pose`` (7,) with its quaternion at length 1; InputError where it is not so to 1e-9."""
+    out = np.array(finite(pose, field, (7,)))
+    norm = float(np.linalg.norm(out[3:]))
+    if abs(norm - 1.0) > 1e-9:
+        raise InputError(f"{field}: the quaternion (w, x, y, z) must have length 1 to 1e-9, got {norm}.")
+    out[3:] /= norm
+    return out
 
 
 class BodyCurve(ABC):
@@ -85,13 +95,24 @@ class BodyCurve(ABC):
 
         ``start``: pose (7,) of the frame at s = 0, default ``self.start``. The Lie-group integrator and its step rule
         are those of :func:`bodyplan.spatial.frames.curve_frames`: error <= ``tolerance`` in position and rotation
-        (between s = 0 and the farthest s), rotations orthonormal to rounding. Raises InputError for a bad argument.
+        (between s = 0 and the farthest s), rotations orthonormal to rounding. Curves made of screws (lines, arcs,
+        helices) are exact and ask no integrator. Raises InputError for a bad argument.
         """
         at = finite(s, "s", (None,))
-        begin = self.start if start is None else finite(start, "start", (7,))
+        begin = self.start if start is None else unit_pose(start, "start")
         if not len(at):
             raise InputError("s: needs at least one value.")
-        places, which = np.unique(np.append(at, 0.0), return_inverse=True)
+        number(tolerance, "tolerance", at_least=1e-13)
+        exact = self._poses(at)
+        if exact is not None:
+            poses = compose(begin, exact)
+            return poses[:, :3], matrix_from_quaternion(poses[:, 3:])
+        low, high = min(at.min(), 0.0), max(at.max(), 0.0)
+        breaks = self.breaks
+        # steps that end at the jumps: nothing is left to search there
+        stops = np.concatenate([breaks[(low < breaks) & (breaks < high)], at, [0.0]])
+        places, which = np.unique(stops, return_inverse=True)
+        which = which[-len(at) - 1 :]
         points, rotations = curve_frames(lambda x: np.stack(self.shape(x), axis=-1), places, tolerance=tolerance)
         zero = which[-1]
         if zero == 0 and np.array_equal(begin, IDENTITY):
@@ -100,6 +121,10 @@ class BodyCurve(ABC):
         back = compose(begin, inverse(here))
         turn = matrix_from_quaternion(back[3:])
         return points[which[:-1]] @ turn.T + back[:3], turn @ rotations[which[:-1]]
+
+    def _poses(self, s: Array) -> Array | None:
+        """Poses (S, 7) at s (S,) seen from the frame at s = 0, for a curve that knows them exactly."""
+        return None
 
     def untwisted(self) -> BodyCurve:
         """The same points with a frame that does not roll (tau = 0): what joints that only bend can follow."""
