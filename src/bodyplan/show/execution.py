@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from bodyplan.show.outcome import Outcome
+from bodyplan.show.outcome import Outcome, no_slip_ratio
 from bodyplan.show.playback import Playback
 from bodyplan.show.stages import stage_rows, worst
 from bodyplan.show.text import (
     counted,
+    degrees,
     esc,
     figure,
     folded,
@@ -27,6 +28,7 @@ from bodyplan.simulate.trial import Trial
 MANY = 8
 #: key of Trial.metrics -> (what it is, unit)
 MEASURES = {
+    "slip_angle_rad": ("slip angle: how far the body moves across its own axis", "°"),
     "tracking_rms_rad": ("servo error, rms", "rad"),
     "tracking_max_rad": ("servo error, largest", "rad"),
     "tracking_rms_m": ("servo error of lengths, rms", "m"),
@@ -95,7 +97,15 @@ def _figures(trial: Trial, playback: Playback) -> list[tuple[str, str, str, str]
     rows.append(("speed", figure(speed, "m/s"), figure(reached, "m/s"), percent(share)))
     drift = "drift to the left" + (" a cycle" if cyclic else "")
     rows.append((drift, figure(0.0, "m"), figure(found["sideways_m"], "m"), ""))
-    return rows + [(what, "", figure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if key in found]
+    ratio = no_slip_ratio(playback.motion, trial)
+    if ratio is not None:
+        no_slip = playback.motion.facts["no_slip_speed"]
+        rows.append(("speed against that without slip", figure(no_slip, "m/s"), figure(reached, "m/s"), percent(ratio)))
+    return rows + [(what, "", _measure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if key in found]
+
+
+def _measure(value: float | None, unit: str) -> str:
+    return degrees(value) if unit == "°" else figure(value, unit)
 
 
 def _losses(trial: Trial, playback: Playback) -> str:

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bodyplan.errors import MissingExtraError
+from bodyplan.show.following import following_figure
+from bodyplan.show.grids import grid_figure
 from bodyplan.show.keyframes import body_keyframes
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
+from bodyplan.show.schedule import schedule_figure
 from bodyplan.show.series import EXECUTED, LIMIT, PLANNED, JointGroup, crest, joint_groups, loads, one_cycle
 from bodyplan.show.stages import Stage, StageRow, few, lag_by_phase, lanes, shades, stage_rows, stages_of
 
@@ -55,6 +58,9 @@ def figures(outcome: Outcome, playback: Playback) -> dict[str, Figure]:
         "advance": advance,
         "slip_by_stage": slip_by_stage,
         "torque": torque,
+        "curve_and_mechanism": lambda o, p: following_figure(p.following, new_figure),
+        "contacts": lambda o, p: schedule_figure(p, new_figure),
+        "grid": lambda o, p: grid_figure(o.grid, new_figure),
     }
     made = {name: make(outcome, playback) for name, make in makers.items()}
     return {name: figure for name, figure in made.items() if figure is not None}

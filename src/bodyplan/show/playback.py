@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
+from bodyplan.show.following import Following
 from bodyplan.simulate.inertia import inertial
 from bodyplan.simulate.loop import Timing
 from bodyplan.simulate.measure import at, directions
@@ -82,6 +84,11 @@ class Playback:
     def span(self) -> float:
         """Time of one cycle, or of the whole motion, s."""
         return self.period if self.period is not None else float(self.t[-1])
+
+    @cached_property
+    def following(self) -> Following | None:
+        """How the mechanism follows its curve over a cycle; None for a gait that follows none."""
+        return Following.of(self.motion, self.span)
 
     def advance(self, centre: Array) -> Array:
         """How far (k,) m centres of mass (k, 3) at the first k times have come along the planned direction

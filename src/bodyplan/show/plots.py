@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,8 +9,12 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.show.figures import STRIPES, peak_and_rms
+from bodyplan.show.following import following_plots
+from bodyplan.show.grids import grid_plot
+from bodyplan.show.layout import label, layout, line
 from bodyplan.show.outcome import Outcome, five_point_gaps, five_point_rates
 from bodyplan.show.playback import Playback
+from bodyplan.show.schedule import schedule_plot
 from bodyplan.show.series import (
     EXECUTED,
     LIMIT,
@@ -46,6 +49,9 @@ def plots(outcome: Outcome, playback: Playback) -> dict[str, Plot]:
         "slip": slip(outcome, playback),
         "lag": lag(playback),
         "five_point": five_point(outcome),
+        "contacts": schedule_plot(playback),
+        "grid": grid_plot(outcome.grid),
+        **following_plots(playback.following),
     }
     for group in joint_groups(playback.motion):
         made[f"angles_{group.kind}"] = heat_map(playback, group, playback.motion.q, f"joint {group.kind}", group.unit)
@@ -56,39 +62,6 @@ def plots(outcome: Outcome, playback: Playback) -> dict[str, Plot]:
     return {name: plot for name, plot in made.items() if plot is not None}
 
 
-def _layout(x: str, y: str, height: int = 340, **more: Any) -> dict[str, Any]:
-    axis = {"gridcolor": "#e4e6e8", "zeroline": False, "automargin": True, "linecolor": "#9aa3ab"}
-    return {
-        "height": height,
-        "margin": {"l": 56, "r": 14, "t": 30, "b": 46},
-        "font": {"family": "system-ui, sans-serif", "size": 13, "color": "#1c2530"},
-        "paper_bgcolor": "#fff",
-        "plot_bgcolor": "#fff",
-        "xaxis": {**axis, "title": {"text": x}},
-        "yaxis": {**axis, "title": {"text": y, "standoff": 6}},
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
-        "hovermode": "closest",
-        **more,
-    }
-
-
-def _label(name: str) -> str:
-    """A name as plotly shows it letter by letter: it reads labels as a kind of HTML."""
-    return html.escape(name, quote=False)
-
-
-def _line(x: Any, y: Any, name: str, color: str, **more: Any) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": compact(x),
-        "y": compact(y),
-        "name": name,
-        "line": {"color": color, "width": 2, **more.pop("line", {})},
-        **more,
-    }
-
-
 def _thin(values: Array, most: int = 600) -> Any:
     return np.unique(np.linspace(0, len(values) - 1, min(len(values), most)).round().astype(int))
 
@@ -97,13 +70,13 @@ def advance(playback: Playback) -> Plot:
     """Advance over time, planned and executed, above the stages."""
     chosen = _thin(playback.t)
     planned = 1e3 * playback.advance(playback.planned_centre)
-    data = [_line(playback.t[chosen], planned[chosen], "planned", PLANNED, line={"dash": "dash"})]
+    data = [line(playback.t[chosen], planned[chosen], "planned", PLANNED, line={"dash": "dash"})]
     if playback.executed_centre is not None and len(playback.executed_centre):
         executed = 1e3 * playback.advance(playback.executed_centre)
         shown = chosen[chosen < len(executed)]
-        data.append(_line(playback.t[shown], executed[shown], "executed", EXECUTED))
-    layout = _layout("time (s)", "advance (mm)", 380)
-    layout["shapes"] = [
+        data.append(line(playback.t[shown], executed[shown], "executed", EXECUTED))
+    made = layout("time (s)", "advance (mm)", 380)
+    made["shapes"] = [
         {
             "type": "line",
             "x0": c * playback.span,
@@ -115,7 +88,7 @@ def advance(playback: Playback) -> Plot:
         }
         for c in range(1, playback.cycles)
     ]
-    return _with_stages({"data": data, "layout": layout}, playback, playback.cycles)
+    return _with_stages({"data": data, "layout": made}, playback, playback.cycles)
 
 
 def _with_stages(plot: Plot, playback: Playback, cycles: int) -> Plot:
@@ -132,7 +105,7 @@ def _with_stages(plot: Plot, playback: Playback, cycles: int) -> Plot:
         for (name, start, end), lane, shade in zip(stages, lanes(stages), shades(stages), strict=True):
             stop = min(shift + end, until)
             if stop > shift + start:
-                bars.append((shift + start, stop - shift - start, -lane, _label(name), STRIPES[shade]))
+                bars.append((shift + start, stop - shift - start, -lane, label(name), STRIPES[shade]))
     left, width, lane_of, names, colors = zip(*bars, strict=True)
     plot["data"].append(
         {
@@ -176,7 +149,7 @@ def slip(outcome: Outcome, playback: Playback) -> Plot | None:
     measured = [r for r in rows if r.along is not None or r.lag is not None]
     if not measured:
         return None
-    names = [_label(row.name) for row in measured]
+    names = [label(row.name) for row in measured]
 
     def bar(values: Sequence[float | None], name: str, color: str) -> dict[str, Any]:
         scaled = np.array([np.nan if v is None else 1e3 * v for v in values])
@@ -190,14 +163,14 @@ def slip(outcome: Outcome, playback: Playback) -> Plot | None:
             "hovertemplate": "%{y}: %{x} mm<extra></extra>",
         }
 
-    layout = _layout("mm a cycle along the plan", "", 120 + 26 * len(names), barmode="group", bargap=0.25)
-    layout["yaxis"].update({"autorange": "reversed", "tickfont": {"size": 11}, "type": "category"})
-    layout["xaxis"].update({"zeroline": True, "zerolinecolor": "#555"})
+    made = layout("mm a cycle along the plan", "", 120 + 26 * len(names), barmode="group", bargap=0.25)
+    made["yaxis"].update({"autorange": "reversed", "tickfont": {"size": 11}, "type": "category"})
+    made["xaxis"].update({"zeroline": True, "zerolinecolor": "#555"})
     data = [
         bar([r.along for r in measured], "slip of the parts meant to rest", LIGHT),
         bar([r.lag for r in measured], "executed − planned advance", EXECUTED),
     ]
-    return {"data": data, "layout": layout}
+    return {"data": data, "layout": made}
 
 
 def lag(playback: Playback) -> Plot | None:
@@ -207,12 +180,12 @@ def lag(playback: Playback) -> Plot | None:
         return None
     phase, gained = found
     data = [
-        _line(phase, 1e3 * one, f"cycle {k + 1}", "#9ecae8", line={"width": 1}, showlegend=False)
+        line(phase, 1e3 * one, f"cycle {k + 1}", "#9ecae8", line={"width": 1}, showlegend=False)
         for k, one in enumerate(gained[:20])
     ]
-    data.append(_line(phase, 1e3 * gained.mean(axis=0), "mean of the cycles", EXECUTED))
-    layout = _layout("time in the cycle (s)", "executed − planned (mm)", 320)
-    return _with_stages({"data": data, "layout": layout}, playback, 1)
+    data.append(line(phase, 1e3 * gained.mean(axis=0), "mean of the cycles", EXECUTED))
+    made = layout("time in the cycle (s)", "executed − planned (mm)", 320)
+    return _with_stages({"data": data, "layout": made}, playback, 1)
 
 
 def heat_map(playback: Playback, group: JointGroup, values: Array, name: str, unit: str) -> Plot:
@@ -223,7 +196,7 @@ def heat_map(playback: Playback, group: JointGroup, values: Array, name: str, un
     trace = {
         "type": "heatmap",
         "x": compact(playback.motion.t[chosen] - playback.motion.t[0]),
-        "y": [_label(name) for name in group.names],
+        "y": [label(name) for name in group.names],
         "z": compact(shown, 4),
         "zmin": -most,
         "zmax": most,
@@ -231,11 +204,11 @@ def heat_map(playback: Playback, group: JointGroup, values: Array, name: str, un
         "colorbar": {"title": {"text": unit}, "thickness": 12, "len": 0.9},
         "hovertemplate": "%{y}, %{x} s: %{z} " + unit + "<extra></extra>",
     }
-    layout = _layout("time (s)", "", max(260, 110 + 13 * len(group.names)))
-    layout["title"] = {"text": f"{name} ({unit})", "font": {"size": 14}, "x": 0.01, "y": 0.985}
-    layout["yaxis"].update({"tickfont": {"size": 10}, "type": "category"})
-    layout["margin"]["r"] = 6
-    return {"data": [trace], "layout": layout}
+    made = layout("time (s)", "", max(260, 110 + 13 * len(group.names)))
+    made["title"] = {"text": f"{name} ({unit})", "font": {"size": 14}, "x": 0.01, "y": 0.985}
+    made["yaxis"].update({"tickfont": {"size": 10}, "type": "category"})
+    made["margin"]["r"] = 6
+    return {"data": [trace], "layout": made}
 
 
 def fastest(playback: Playback, group: JointGroup) -> Plot:
@@ -243,13 +216,13 @@ def fastest(playback: Playback, group: JointGroup) -> Plot:
     chosen = one_cycle(playback, 10**6)
     rate = np.abs(playback.motion.qd[np.ix_(chosen, group.columns)]).max(axis=1)
     t = playback.motion.t[chosen] - playback.motion.t[0]
-    layout = _layout("time (s)", f"fastest joint ({group.rate_unit})", 240)
-    layout["yaxis"]["rangemode"] = "tozero"
-    data = [_line(*crest(t, rate), "planned", PLANNED, showlegend=False)]
+    made = layout("time (s)", f"fastest joint ({group.rate_unit})", 240)
+    made["yaxis"]["rangemode"] = "tozero"
+    data = [line(*crest(t, rate), "planned", PLANNED, showlegend=False)]
     limit = float(playback.motion.robot.rates[group.columns].min())
     if limit <= 2.0 * float(rate.max(initial=0.0)):
-        data.append(_line([t[0], t[-1]], [limit, limit], "rate limit", LIMIT, line={"dash": "dot"}))
-    return {"data": data, "layout": layout}
+        data.append(line([t[0], t[-1]], [limit, limit], "rate limit", LIMIT, line={"dash": "dot"}))
+    return {"data": data, "layout": made}
 
 
 def load_over_time(outcome: Outcome, group: JointGroup) -> Plot | None:
@@ -258,12 +231,12 @@ def load_over_time(outcome: Outcome, group: JointGroup) -> Plot | None:
     if found is None:
         return None
     t, load = found
-    layout = _layout("time (s)", f"largest {group.load_name}", 280)
-    layout["yaxis"]["rangemode"] = "tozero"
+    made = layout("time (s)", f"largest {group.load_name}", 280)
+    made["yaxis"]["rangemode"] = "tozero"
     curve = crest(t, np.abs(load[:, group.columns]).max(axis=1))
     return {
-        "data": [_line(*curve, "largest of all joints", _source_color(outcome), showlegend=False)],
-        "layout": layout,
+        "data": [line(*curve, "largest of all joints", _source_color(outcome), showlegend=False)],
+        "layout": made,
     }
 
 
@@ -276,7 +249,7 @@ def load_by_joint(outcome: Outcome, group: JointGroup) -> Plot | None:
     bars = [
         {
             "type": "bar",
-            "x": [_label(name) for name in group.names],
+            "x": [label(name) for name in group.names],
             "y": compact(values, 4),
             "name": name,
             "marker": {"color": color},
@@ -284,9 +257,9 @@ def load_by_joint(outcome: Outcome, group: JointGroup) -> Plot | None:
         }
         for name, values, color in (("peak", peak, _source_color(outcome)), ("rms", rms, LIGHT))
     ]
-    layout = _layout("joint", group.load_name, 300, barmode="group", bargap=0.2)
-    layout["xaxis"].update({"type": "category", "tickfont": {"size": 10}})
-    return {"data": bars, "layout": layout}
+    made = layout("joint", group.load_name, 300, barmode="group", bargap=0.2)
+    made["xaxis"].update({"type": "category", "tickfont": {"size": 10}})
+    return {"data": bars, "layout": made}
 
 
 def _source_color(outcome: Outcome) -> str:
@@ -307,7 +280,7 @@ def five_point(outcome: Outcome) -> Plot | None:
     ):
         # zero has no place on a logarithmic axis
         gap = np.maximum(np.abs(taken - exact).max(axis=1), 1e-16)
-        data.append(_line(*crest(t, gap), name, color, line={"width": 1.4}))
-    layout = _layout("time (s)", "five-point − exact, worst joint", 300)
-    layout["yaxis"].update({"type": "log", "exponentformat": "power"})
-    return {"data": data, "layout": layout}
+        data.append(line(*crest(t, gap), name, color, line={"width": 1.4}))
+    made = layout("time (s)", "five-point − exact, worst joint", 300)
+    made["yaxis"].update({"type": "log", "exponentformat": "power"})
+    return {"data": data, "layout": made}

@@ -14,11 +14,14 @@ from bodyplan.files import replacing
 from bodyplan.show import sections
 from bodyplan.show.execution import execution
 from bodyplan.show.figures import write_figures
+from bodyplan.show.following import following_section
+from bodyplan.show.grids import grid_section
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.overview import head
 from bodyplan.show.playback import Playback
 from bodyplan.show.plots import plots
 from bodyplan.show.scene import scene, script_json
+from bodyplan.show.schedule import schedule_part
 from bodyplan.show.text import esc, plot, section
 
 #: the page's own scripts, in the order in which they run
@@ -64,7 +67,10 @@ def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
         "Checks": sections.checks(outcome),
         "Planned and executed": execution(outcome, playback),
         "Comparison": sections.comparison(outcome),
-        "Plots": _curves(outcome, drawn),
+        "Beside the paper": sections.beside_the_paper(outcome),
+        "Grid": grid_section(outcome.grid, outcome.name),
+        "Curve and mechanism": following_section(playback.following, drawn),
+        "Plots": _curves(outcome, playback, drawn),
         "Rates": sections.rates(outcome),
         "Notes and data": sections.notes(outcome),
     }
@@ -169,7 +175,7 @@ plays, arrow keys step. Add <code>#t=3.2</code> to the address to open the repor
     )
 
 
-def _curves(outcome: Outcome, drawn: Mapping[str, str]) -> str:
+def _curves(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
     out = ""
     if "body_keyframes" in drawn:
         picture = base64.b64encode(drawn["body_keyframes"].encode("utf-8")).decode("ascii")
@@ -183,4 +189,4 @@ def _curves(outcome: Outcome, drawn: Mapping[str, str]) -> str:
             name = "angles" if kind == "angle" else "lengths"
             out += f"<h3>Joint {name} over one cycle, planned</h3>" + plot(f"angles_{kind}")
             out += plot(f"rates_{kind}") + plot(f"fastest_{kind}")
-    return section("curves", "Plots", out)
+    return section("curves", "Plots", out + schedule_part(playback))

@@ -9,6 +9,7 @@ from bodyplan.show.outcome import Comparison, Outcome, five_point_gaps
 from bodyplan.show.overview import options_rows
 from bodyplan.show.text import (
     NOTHING,
+    degrees,
     esc,
     figure,
     folded,
@@ -59,7 +60,7 @@ def comparison(outcome: Outcome) -> str:
     """This mission beside the others."""
     if not outcome.others:
         return ""
-    head = (
+    head: tuple[str, ...] = (
         "mission",
         "title",
         "executed / planned",
@@ -69,11 +70,17 @@ def comparison(outcome: Outcome) -> str:
         "peak torque",
         "cost of transport",
     )
-    rows = [_compared(outcome.itself, True), *(_compared(other, False) for other in outcome.others)]
-    return section("comparison", "Beside other missions", table(head, rows, kind="compare", numbers=range(2, 8)))
+    compared = (outcome.itself, *outcome.others)
+    slips = any(other.slip_angle is not None for other in compared)
+    paced = any(other.no_slip_ratio is not None for other in compared)
+    head += ("slip angle",) * slips + ("speed / no-slip speed",) * paced
+    rows = [_compared(other, i == 0, slips, paced) for i, other in enumerate(compared)]
+    return section(
+        "comparison", "Beside other missions", table(head, rows, kind="compare", numbers=range(2, len(head)))
+    )
 
 
-def _compared(other: Comparison, mine: bool) -> tuple[str, ...]:
+def _compared(other: Comparison, mine: bool, slips: bool, paced: bool) -> tuple[str, ...]:
     name = f"<b>{esc(other.name)}</b> (this one)" if mine else esc(other.name)
     return (
         name + ("" if other.status == "ok" else f" <small>({esc(other.status)})</small>"),
@@ -84,7 +91,27 @@ def _compared(other: Comparison, mine: bool) -> tuple[str, ...]:
         figure(other.peak_joint_rate, "rad/s"),
         figure(other.peak_torque, "N m"),
         figure(other.cost_of_transport, digits=3, zeros=True),
+        *((degrees(other.slip_angle),) if slips else ()),
+        *((percent(other.no_slip_ratio),) if paced else ()),
     )
+
+
+def beside_the_paper(outcome: Outcome) -> str:
+    """What the paper prints, and what was found here."""
+    if not outcome.paper:
+        return ""
+    rows = [
+        (
+            esc(row.what),
+            figure(row.printed, row.unit),
+            NOTHING if row.value is None else figure(row.value, row.unit, 3),
+            f"<code>{esc(row.ours)}</code>" + (f" ({esc(row.problem)})" if row.problem else ""),
+            esc(row.source),
+        )
+        for row in outcome.paper
+    ]
+    head = ("what", "the paper", "here", "here it is", "source")
+    return section("paper", "Beside the paper", table(head, rows, kind="compare", numbers=(1, 2)))
 
 
 def rates(outcome: Outcome) -> str:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.motion import Motion
-from bodyplan.show.playback import Playback
 from bodyplan.simulate.trial import Trial
+
+if TYPE_CHECKING:
+    from bodyplan.show.playback import Playback
 
 #: colours that stay apart for every kind of colour vision (Okabe and Ito), dark enough on white
 PLANNED, EXECUTED, LIMIT = "#d98200", "#0072b2", "#b3261e"
+
+#: for several lines that are neither plan nor execution
+SERIES = (EXECUTED, PLANNED, "#009e73", "#cc79a7", "#56b4e9", "#5c4b8a")
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,11 @@ def percent(value: float | None) -> str:
     return figure(None if value is None else 100.0 * value, "%", 3, zeros=True)
 
 
+def degrees(angle: float | None) -> str:
+    """An angle in rad as degrees."""
+    return figure(None if angle is None else math.degrees(angle), "°", 3, zeros=True)
+
+
 def unit_of(name: str) -> str:
     """SI unit of a quantity by its name; empty where the name does not tell."""
     if name in _UNITS:

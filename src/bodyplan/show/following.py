@@ -1,0 +1,169 @@
+"""The part of a report that lays the mechanism over the curve that it follows, and says how well it does so."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bodyplan import gaits
+from bodyplan.arrays import Array
+from bodyplan.errors import BodyplanError
+from bodyplan.motion import Motion
+from bodyplan.show import fitted_plots
+from bodyplan.show.fitted import Drawn
+from bodyplan.show.fitted_figures import draw_overlay, draw_turning
+from bodyplan.show.layout import layout, line
+from bodyplan.show.series import EXECUTED, PLANNED
+from bodyplan.show.text import esc, figure, percent, plot, section, table
+from bodyplan.spatial import compose, inverse
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: samples of a cycle at which the fit is measured, and key times at which it is drawn
+SAMPLES, KEYS = 25, 4
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """Fits of the motion's curve over a cycle: at times ``t`` (k,) s the ``error`` E_nm and the ``distance`` m, largest
+    along the body; ``keys`` at times ``key_times`` s, placed in the world; ``length`` m of the body."""
+
+    t: Array
+    error: Array
+    quadrature_error: Array
+    distance: Array
+    key_times: Array
+    keys: tuple[Drawn, ...]
+    length: float
+    problem: str = ""
+
+    @classmethod
+    def of(cls, motion: Motion, span: float) -> Following | None:
+        """Measured over ``span`` s from the motion's beginning; None for a gait that does not follow a curve."""
+        kind = motion.gait.get("kind")
+        planner = gaits.KINDS.get(kind) if isinstance(kind, str) else None
+        if planner is None or not hasattr(planner, "fit_at"):
+            return None
+        none = np.zeros(0)
+        try:
+            gait: Any = planner(**{name: value for name, value in motion.gait.items() if name != "kind"})
+            inside = np.flatnonzero(motion.t <= motion.t[0] + span * (1.0 + 1e-9))
+            chosen = np.unique(np.linspace(0, inside[-1], SAMPLES).round().astype(int))
+            fits = {int(i): gait.fit_at(motion.robot, float(motion.t[i])) for i in chosen}
+            shown = chosen[[round(k * (len(chosen) - 1) / KEYS) for k in range(KEYS)]]
+            drawn = []
+            for i in np.unique(shown):
+                fit = fits[int(i)]
+                drawn.append(Drawn.of(fit, compose(motion.base[i], inverse(np.asarray(fit.base)))))
+            error, quadrature, distance = (
+                np.array([float(getattr(fit, name)) for fit in fits.values()])
+                for name in ("error", "quadrature_error", "max_distance")
+            )
+        except BodyplanError as failed:  # a report is worth having without this part
+            return cls(none, none, none, none, none, (), 0.0, str(failed))
+        t0 = motion.t[0]
+        length = float(drawn[0].s[-1])
+        return cls(
+            motion.t[chosen] - t0, error, quadrature, distance, motion.t[np.unique(shown)] - t0, tuple(drawn), length
+        )
+
+
+def following_section(found: Following | None, pictures: Mapping[str, str]) -> str:
+    """Curve and mechanism as a part of the report; ``pictures`` are the figures as SVG by name."""
+    if found is None:
+        return ""
+    if found.problem:
+        return section("following", "Curve and mechanism", f"<p>Not drawn: {esc(found.problem)}</p>")
+    rows = [
+        (f"{figure(t, 's', 3)}", figure(d.error, digits=4), figure(d.quadrature_error, digits=2),
+         figure(d.max_distance, "m", 4), percent(d.max_distance / found.length))
+        for t, d in zip(found.key_times, found.keys, strict=True)
+    ]  # fmt: skip
+    head = ("time", "E_nm", "its quadrature error", "largest distance", "of the body’s length")
+    out = f"<p>{in_words(found)}</p>" + table(head, rows, numbers=(0, 1, 2, 3, 4))
+    if "curve_and_mechanism" in pictures:
+        out += "<h3>At key times</h3>" + _picture(pictures["curve_and_mechanism"])
+    out += plot("overlay", f"Curve and mechanism at {figure(float(found.key_times[0]), 's', 3)}, lengths true.")
+    out += plot(
+        "turning",
+        "The sum of the joint angles up to a place against the turning of the curve: a staircase for hinges, a "
+        "polyline for arcs.",
+    )
+    return section("following", "Curve and mechanism", out + plot("fit_error"))
+
+
+def in_words(found: Following) -> str:
+    """The fit over the cycle in a sentence (HTML)."""
+    worst = int(np.argmax(found.distance))
+    small, large = float(found.error.min()), float(found.error.max())
+    between = f"between {figure(small)} and {figure(large)}" if large > 1.001 * small else f"{figure(large)} throughout"
+    return (
+        f"Over the cycle the mean distance between mechanism and curve, as a share of the body’s length (E_nm), is "
+        f"<b>{between}</b>. The largest distance is <b>{figure(float(found.distance[worst]), 'm')}</b> "
+        f"({percent(float(found.distance[worst]) / found.length)} of the body), at "
+        f"{figure(float(found.t[worst]), 's', 3)}."
+    )
+
+
+def _picture(svg: str) -> str:
+    data = base64.b64encode(svg.encode("utf-8")).decode("ascii")
+    return (
+        '<div class="scroll picture" tabindex="0"><img alt="Curve and mechanism at key times, and their turning along '
+        f'the body" src="data:image/svg+xml;base64,{data}"></div>'
+    )
+
+
+def following_plots(found: Following | None) -> dict[str, dict[str, Any] | None]:
+    """Overlay and turning at the first key time; error and distance over the cycle."""
+    if found is None or not found.keys:
+        return {}
+    first = found.keys[0]
+    return {
+        "overlay": fitted_plots.overlay(first),
+        "turning": fitted_plots.turning(first),
+        "fit_error": _error_plot(found),
+    }
+
+
+def _error_plot(found: Following) -> dict[str, Any]:
+    data = [
+        line(found.t, found.error, "E_nm", PLANNED),
+        line(found.t, 1e3 * found.distance, "largest distance", EXECUTED, yaxis="y2"),
+    ]
+    made = layout("time (s)", "E_nm", 300)
+    made["yaxis"].update({"rangemode": "tozero", "exponentformat": "power"})
+    made["yaxis2"] = {
+        "title": {"text": "largest distance (mm)", "standoff": 6},
+        "overlaying": "y",
+        "side": "right",
+        "rangemode": "tozero",
+        "showgrid": False,
+        "automargin": True,
+    }
+    return {"data": data, "layout": made}
+
+
+def following_figure(found: Following | None, new_figure: Callable[[float], Figure]) -> Figure | None:
+    """Curve and mechanism at the key times from above (and from the side where the curve is not flat), and their
+    turning at the first."""
+    if found is None or not found.keys:
+        return None
+    views = [view for view in ("top", "side") if any(view in drawn.views for drawn in found.keys)]
+    made = new_figure(2.1 * len(views) + 2.6)
+    heights = [*([2.1] * len(views)), 2.6]
+    rows: Any = made.subfigures(len(views) + 1, 1, height_ratios=heights)
+    for view, row in zip(views, rows, strict=False):
+        axes = row.subplots(1, len(found.keys), sharey=True, squeeze=False)[0]
+        for i, (ax, drawn, t) in enumerate(zip(axes, found.keys, found.key_times, strict=True)):
+            draw_overlay(ax, drawn, view, named=i == 0)
+            ax.set_title(f"{t:.2f} s" if view == views[0] else "", fontsize=8)
+            ax.tick_params(labelsize=7)
+            if i:
+                ax.set_ylabel("")
+    draw_turning(rows[-1].subplots(), found.keys[0])
+    return made
