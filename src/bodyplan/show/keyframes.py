@@ -11,7 +11,7 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.robot.model import Robot
 from bodyplan.show.playback import Playback
 from bodyplan.show.series import EXECUTED, PLANNED
-from bodyplan.show.shapes import Scenery, bones, extent, outline, scenery
+from bodyplan.show.shapes import Scenery, arc_bones, arc_points, bones, extent, outline, ribbon, scenery
 from bodyplan.show.stages import stages_of
 
 if TYPE_CHECKING:
@@ -110,10 +110,13 @@ def _robot(ax: Axes, robot: Robot, poses: Array, axes: tuple[int, int], style: M
     from matplotlib.collections import LineCollection, PolyCollection
 
     flat = list(axes)
-    lines = [poses[[a, b], :3][:, flat] for a, b in bones(robot)]
+    arcs = arc_bones(robot)
+    paths = {(a, b): arc_points(poses[a], poses[b], length)[:, flat] for (a, b), (length, _) in arcs.items()}
+    lines = [paths[pair] if pair in paths else poses[list(pair), :3][:, flat] for pair in bones(robot)]
     if lines:
         ax.add_collection(LineCollection(lines, colors=style["facecolor"], linewidths=1.6))
-    polygons = [p for c in robot.contacts for p in outline(c, poses[robot.frame_index(c.frame)], axes)]
+    polygons = [ribbon(paths[pair], radius) for pair, (_, radius) in arcs.items() if radius > 0.0]
+    polygons += [p for c in robot.contacts for p in outline(c, poses[robot.frame_index(c.frame)], axes)]
     if polygons:
         ax.add_collection(PolyCollection(polygons, **style))
 

@@ -9,6 +9,7 @@
   const times = numbers(data.t), first = times[0], last = times[times.length - 1];
   const unpack = (track) => track && Object.assign(track, {
     poses: numbers(track.poses), centre: numbers(track.centre), advance: numbers(track.advance) });
+  const path = data.path && numbers(data.path);
   const planned = unpack(data.planned), executed = unpack(data.executed);
   const fields = data.ground.fields.map((f) => ({ nx: f.nx, ny: f.ny, x: numbers(f.x), y: numbers(f.y), z: numbers(f.z) }));
   const COLORS = { planned: ["#e08a00", "#f0a93a", "#8a5500"], executed: ["#0072b2", "#2f97d3", "#004a75"] };
@@ -17,7 +18,8 @@
   const readout = find("readout"), playButton = find("play");
   const layer = document.createElement("canvas"), layerContext = layer.getContext("2d");
   const state = { t: Math.max(first, 0), playing: false, speed: 1, azimuth: -1.2, elevation: 0.72, scale: 1,
-    target: [0, 0, 0], planned: true, executed: Boolean(executed), trail: true, follow: false };
+    target: [0, 0, 0], planned: true, executed: Boolean(executed), trail: true, follow: false,
+    curve: Boolean(path) };
   let width = 0, height = 0, camera = null, dirty = true, before = 0;
 
   // --- vectors and poses
@@ -90,11 +92,22 @@
     points.forEach((p, i) => { const [x, y] = project(p); if (i) ctx.lineTo(x, y); else ctx.moveTo(x, y); });
     ctx.strokeStyle = color; ctx.lineWidth = wide; ctx.lineCap = "round"; ctx.lineJoin = "round"; ctx.stroke();
   }
-  function tube(ctx, a, b, radius, colors, odd) {
+  function tube(ctx, points, radius, colors, odd) {
     const r = Math.max(radius * state.scale, 0.8), lit = [0, 0, 0.4 * radius];
-    line(ctx, [a, b], colors[2], 2 * r + 1.2);
-    line(ctx, [a, b], odd ? colors[1] : colors[0], 2 * r - 0.4);
-    if (r > 3) line(ctx, [a.map((x, k) => x + lit[k]), b.map((x, k) => x + lit[k])], "rgba(255,255,255,.28)", 0.7 * r);
+    line(ctx, points, colors[2], 2 * r + 1.2);
+    line(ctx, points, odd ? colors[1] : colors[0], 2 * r - 0.4);
+    if (r > 3) line(ctx, points.map((p) => p.map((x, k) => x + lit[k])), "rgba(255,255,255,.28)", 0.7 * r);
+  }
+  // an arc of constant curvature leaves along x of its first frame; its bend is what turns that into the last
+  function arc(from, to, length) {
+    const [w, x, y, z] = from.q, [u, i, j, k] = to.q;
+    const turn = [w * i - x * u - y * k + z * j, w * j + x * k - y * u - z * i, w * k - x * j + y * i - z * u];
+    const half = Math.atan2(Math.hypot(...turn), w * u + x * i + y * j + z * k), size = Math.hypot(turn[1], turn[2]);
+    const bend = 2 * (half > Math.PI / 2 ? half - Math.PI : half), side = size > 1e-9 ? [turn[2] / size, -turn[1] / size] : [0, 0];
+    return Array.from({ length: 9 }, (_, n) => {
+      const a = bend * n / 8, ahead = Math.abs(bend) < 1e-6 ? n / 8 : Math.sin(a) / bend, aside = Math.abs(bend) < 1e-6 ? 0 : (1 - Math.cos(a)) / bend;
+      return moved(from, [length * ahead, length * aside * side[0], length * aside * side[1]]);
+    });
   }
   function box(ctx, pose, shape, colors) {
     const h = shape.half, c = shape.start;
@@ -126,16 +139,18 @@
   function partsOf(track, colors) {
     const poses = posesAt(track, state.t), parts = [];
     const add = (p, draw) => parts.push({ depth: dot(camera.toward, p), draw });
-    for (const [i, j] of data.bones) {
+    data.bones.forEach(([i, j, length, radius], number) => {
       const a = poses[i].p, b = poses[j].p, half = a.map((x, k) => 0.5 * (x + b[k])), cover = hiddenBy(poses, half);
-      add(cover ? moved(poses[cover.body], cover.start) : half, (ctx) => tube(ctx, a, b, data.boneRadius, colors, false));
-    }
+      const points = length ? arc(poses[i], poses[j], length) : [a, b];
+      add(cover ? moved(poses[cover.body], cover.start) : half,
+        (ctx) => tube(ctx, points, radius || data.boneRadius, colors, Boolean(length) && number % 2 === 1));
+    });
     data.shapes.forEach((shape, number) => {
       const pose = poses[shape.body], a = moved(pose, shape.start), b = moved(pose, shape.end);
       const middle = a.map((x, k) => 0.5 * (x + b[k]));
       if (shape.kind === "box") add(a, (ctx) => box(ctx, pose, shape, colors));
       else if (shape.kind === "rim") add(a, (ctx) => polygon(ctx, ring(pose, shape), null, colors[number % 2], Math.max(2, 0.12 * shape.radius * state.scale)));
-      else add(middle, (ctx) => tube(ctx, a, b, shape.radius, colors, number % 2 === 1));
+      else add(middle, (ctx) => tube(ctx, [a, b], shape.radius, colors, number % 2 === 1));
     });
     return parts;
   }
@@ -203,6 +218,10 @@
     context.beginPath(); context.arc(x, y, 4, 0, 7); context.fillStyle = color; context.fill();
     context.strokeStyle = "#fff"; context.lineWidth = 1.5; context.stroke();
   }
+  function drawPath() {
+    const points = Array.from({ length: path.length / 3 }, (_, k) => [path[3 * k], path[3 * k + 1], path[3 * k + 2]]);
+    line(context, points, "rgba(0,158,115,.75)", 2);
+  }
   function drawScale() {
     const step = gridStep(), long = step * state.scale, x = 14, y = height - 16;
     context.strokeStyle = context.fillStyle = "#333"; context.lineWidth = 1.5; context.lineCap = "butt";
@@ -234,6 +253,7 @@
     backToFront(solid, context);
     if (ghost && fields.length) veiled(0.4, (ctx) => backToFront(ghost, ctx));
     drawFaces(true, inFront);
+    if (path && state.curve) drawPath();
     if (state.trail) {
       if (showPlanned) drawTrail(planned, COLORS.planned[2], [5, 4]);
       if (showExecuted) drawTrail(executed, COLORS.executed[2], []);

@@ -149,6 +149,8 @@ def _replay(playback: Playback) -> str:
     toggles = [("planned", "planned", "planned")]
     if executed:
         toggles.append(("executed", "executed", "executed"))
+    if any(claim.kind == "follows" for claim in playback.motion.claims):
+        toggles.append(("curve", "curve", "curve"))
     toggles += [("trail", "trail", ""), ("follow", "follow", "")]
     boxes = "".join(
         f'<label class="{kind}"><input type="checkbox" data-toggle="{name}"> {text}</label>'

@@ -10,8 +10,9 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.robot.model import Robot
+from bodyplan.show.path import planned_path
 from bodyplan.show.playback import Playback
-from bodyplan.show.shapes import bones, extent, scenery, thickness
+from bodyplan.show.shapes import arc_bones, bones, extent, scenery, thickness
 from bodyplan.show.stages import few, lanes, shades, stages_of
 
 
@@ -24,6 +25,8 @@ def scene(playback: Playback) -> dict[str, Any]:
     tracks = [p for p in (playback.planned, playback.executed) if p is not None]
     low, high = extent(tracks, robot)
     stages = stages_of(playback)
+    arcs = arc_bones(robot)
+    path = planned_path(playback)
     return {
         "t": packed(playback.t),
         "bodies": len(frames),
@@ -32,7 +35,9 @@ def scene(playback: Playback) -> dict[str, Any]:
         if playback.executed is None or playback.executed_centre is None
         else _track(playback, playback.executed[:, frames], playback.executed_centre),
         "shapes": _shapes(robot, place),
-        "bones": [[place[a], place[b]] for a, b in joined],
+        # a third and fourth number make it an arc: length and radius
+        "bones": [[place[a], place[b], *arcs.get((a, b), ())] for a, b in joined],
+        "path": None if path is None else packed(path),
         "boneRadius": thickness(robot, playback.planned),
         "ground": _ground(playback, low, high),
         "low": low.tolist(),

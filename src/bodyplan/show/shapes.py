@@ -9,9 +9,9 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.ground.base import Ground, Solid
-from bodyplan.robot.elements import Contact
+from bodyplan.robot.elements import Arc, Contact
 from bodyplan.robot.model import Robot
-from bodyplan.spatial.rotations import rotate
+from bodyplan.spatial.rotations import conjugate, multiply, quaternion_log, rotate
 
 #: corners of a unit box, and its six faces by corner with their outward axis and sign
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -41,6 +41,46 @@ def bones(robot: Robot) -> list[tuple[int, int]]:
                 out.append((before, after))
             before = after
     return out
+
+
+def arc_bones(robot: Robot) -> dict[tuple[int, int], tuple[float, float]]:
+    """Of the :func:`bones` those that are arcs of constant curvature: length and radius m; the radius is that of the
+    sphere on the frame, or of the base, 0 where there is none."""
+    thick = {contact.frame: contact.radius for contact in robot.contacts if contact.shape == "sphere"}
+    joined = set(bones(robot))
+    out = {}
+    for chain in robot.chains:
+        before = robot.frame_index(chain.parent)
+        for i, element in enumerate(chain.elements):
+            name = chain.frame_name(i)
+            after = robot.frame_index(name)
+            if isinstance(element, Arc) and (before, after) in joined:
+                out[before, after] = (element.length, thick.get(name, 0.0))
+            before = after
+    return out
+
+
+def arc_points(start: Array, end: Array, length: float, count: int = 13) -> Array:
+    """Points (count, 3) m of an arc of constant curvature and ``length`` m between two poses (7,), which leaves along x
+    of the first; its bend is what turns the first into the second (less than a full turn)."""
+    turn = quaternion_log(multiply(conjugate(start[3:]), end[3:]))
+    bend = float(np.hypot(turn[1], turn[2]))
+    u = np.linspace(0.0, 1.0, count)
+    # x = L sin(u b) / b and the sagitta L (1 - cos(u b)) / b, both regular at b = 0
+    ahead = length * u * np.sinc(u * bend / np.pi)
+    aside = length * u * np.sin(0.5 * u * bend) * np.sinc(0.5 * u * bend / np.pi)
+    toward = np.array([0.0, turn[2], -turn[1]]) / bend if bend > 1e-12 else np.zeros(3)
+    local = ahead[:, None] * np.array([1.0, 0.0, 0.0]) + aside[:, None] * toward
+    return np.asarray(start[:3] + rotate(start[3:], local))
+
+
+def ribbon(points: Array, radius: float) -> Array:
+    """Polygon (2k, 2) m around a line of points (k, 2), ``radius`` m to either side."""
+    along = np.gradient(points, axis=0)
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    along = along / np.where(size > 0.0, size, 1.0)
+    aside = radius * np.stack([-along[:, 1], along[:, 0]], axis=-1)
+    return np.concatenate([points + aside, (points - aside)[::-1]])
 
 
 def thickness(robot: Robot, poses: Array) -> float:
