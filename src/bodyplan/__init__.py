@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bodyplan import curves, export, fitting, gaits, ground, rates, spatial
     from bodyplan.check import Report, check
-    from bodyplan.curves import BodyCurve, ConcertinaCurve, Serpenoid, SinusLift, Spiral
+    from bodyplan.curves import BodyCurve, ConcertinaCurve, Segments, Serpenoid, SinusLift, Spiral
     from bodyplan.errors import (
         BodyplanError,
         InputError,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     )
     from bodyplan.export import load, save
     from bodyplan.fitting import exact_link_length, links_on_curve
-    from bodyplan.gaits import Concertina
+    from bodyplan.gaits import Concertina, Rolling, Serpentine, Sidewinding, SinusLifting
     from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
     from bodyplan.job import run
     from bodyplan.missions import load_mission
@@ -68,12 +68,17 @@ _FACE = {
     "Surface": "ground",
     "BodyCurve": "curves",
     "ConcertinaCurve": "curves",
+    "Segments": "curves",
     "Serpenoid": "curves",
     "SinusLift": "curves",
     "Spiral": "curves",
     "exact_link_length": "fitting",
     "links_on_curve": "fitting",
     "Concertina": "gaits",
+    "Rolling": "gaits",
+    "Serpentine": "gaits",
+    "Sidewinding": "gaits",
+    "SinusLifting": "gaits",
     "Claim": "motion",
     "Motion": "motion",
     "times": "motion",

@@ -9,11 +9,15 @@ from bodyplan.curves.base import BodyCurve, Shape
 from bodyplan.curves.concertina import ConcertinaCurve
 from bodyplan.curves.constant import Constant
 from bodyplan.curves.dynamic import GAMMA_STAR, dynamic_curve, dynamic_slope
+from bodyplan.curves.segment_kinds import Bend, Helix, Line
+from bodyplan.curves.segments import Segments
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.curves.sinuslift import SinusLift
 from bodyplan.curves.spiral import Spiral
+from bodyplan.curves.steering import Steering
 from bodyplan.curves.sums import Sum
 from bodyplan.curves.tables import KINDS, from_dict
+from bodyplan.curves.transition import Transition
 from bodyplan.curves.untwisted import Untwisted
 from bodyplan.errors import UnknownNameError
 
@@ -21,14 +25,20 @@ __all__ = [
     "CURVES",
     "GAMMA_STAR",
     "KINDS",
+    "Bend",
     "BodyCurve",
     "ConcertinaCurve",
     "Constant",
+    "Helix",
+    "Line",
+    "Segments",
     "Serpenoid",
     "Shape",
     "SinusLift",
     "Spiral",
+    "Steering",
     "Sum",
+    "Transition",
     "Untwisted",
     "dynamic_curve",
     "dynamic_slope",

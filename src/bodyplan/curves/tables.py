@@ -8,17 +8,21 @@ from typing import Any
 
 from bodyplan.curves.base import BodyCurve
 from bodyplan.curves.constant import Constant
+from bodyplan.curves.segments import Segments
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.curves.sinuslift import SinusLift
 from bodyplan.curves.spiral import Spiral
+from bodyplan.curves.steering import Steering
 from bodyplan.curves.sums import Sum
+from bodyplan.curves.transition import Transition
 from bodyplan.curves.untwisted import Untwisted
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.units import to_si
 
 #: kind -> class, for every body curve
 KINDS: dict[str, type[BodyCurve]] = {
-    curve.kind: curve for curve in (Constant, Serpenoid, SinusLift, Spiral, Sum, Untwisted)
+    curve.kind: curve
+    for curve in (Constant, Segments, Serpenoid, SinusLift, Spiral, Steering, Sum, Transition, Untwisted)
 }
 #: curves inside curves inside ...
 DEEPEST = 16
