@@ -30,8 +30,16 @@ class Claim:
     * ``on_curve``: origins of ``frames`` lie on a body curve from ``start`` to ``end``; ``curve`` is its
       name in ``bodyplan.curves``, ``parameters`` arrays with one entry a sample, ``unit`` m per curve unit,
       ``pose`` (T, 3) x, y, heading of the curve in the world, ``tolerance`` m.
-    * ``periodic``: after ``period`` s the joints repeat and the base is moved by ``advance`` (3,) m and
-      ``turn`` rad.
+    * ``periodic``: after ``period`` s the joints repeat and the base is displaced: a point p of it goes to
+      R(``turn``) p + ``advance`` (3,) m; ``turn`` rad about the world's z, or a rotation vector (3,).
+    * ``follows``: origins of ``frames`` (F,) stay within ``tolerance`` m of a curve in space: that of
+      frame f at sample k lies at arc length ``places`` (T, F) m of ``curve`` (a table for
+      :func:`bodyplan.curves.from_dict`), whose frame at s = 0 lies at ``pose`` (7,), or (T, 7).
+    * ``no_slip``: origins of ``frames``, in order along the body, move along the body with ``speed`` (T,)
+      m/s; the rest (root mean square) is at most the share ``tolerance`` of it.
+    * ``grips``: points of the surface that come within ``height`` m of the floor, or of ``pole`` (a table of
+      ``point``, ``direction`` (3,) and ``radius``), are at rest: their mean speed is at most the share
+      ``tolerance`` of ``speed`` m/s. ``contacts``: names, all where there are none.
     * ``on_floor``: every capsule and sphere touches the floor all the time, to ``tolerance`` m.
     * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).
     """

@@ -12,10 +12,13 @@ from bodyplan.arrays import Array
 from bodyplan.check.report import Line
 from bodyplan.errors import UnknownNameError
 from bodyplan.motion import Claim, Motion
-from bodyplan.spatial import rotations
+from bodyplan.spatial import apply, rotations
+from bodyplan.spatial.poses import IDENTITY
 
 #: slack of time comparisons, s
 SAME_TIME = 1e-9
+#: places on a curve that one claim is tested at
+MOST_PLACES = 200_000
 
 
 def at_rest(motion: Motion, positions: Array, claim: Claim) -> Line:
@@ -93,9 +96,10 @@ def periodic(motion: Motion, positions: Array, claim: Claim) -> Line:
         return _untested(claim, why)
     first, second = np.flatnonzero(inside)[exact], nearest[exact]
     joints = float(np.abs(motion.q[second] - motion.q[first]).max(initial=0.0))
-    moved = motion.base[second, :3] - motion.base[first, :3] - np.asarray(data["advance"])
-    # the base turns by ``turn`` about the world's z
-    turned = rotations.multiply(rotations.quaternion_exp([0.0, 0.0, float(data["turn"])]), motion.base[first, 3:])
+    vector = np.asarray(data["turn"], dtype=np.float64)
+    turn = rotations.quaternion_exp(vector if vector.ndim else vector * np.array([0.0, 0.0, 1.0]))
+    moved = motion.base[second, :3] - rotations.rotate(turn, motion.base[first, :3]) - np.asarray(data["advance"])
+    turned = rotations.multiply(turn, motion.base[first, 3:])
     left = rotations.quaternion_log(rotations.multiply(rotations.conjugate(turned), motion.base[second, 3:]))
     value = max(joints, float(np.abs(moved).max()), float(np.linalg.norm(left, axis=-1).max()))
     limit = float(data["tolerance"])
@@ -110,6 +114,98 @@ def periodic(motion: Motion, positions: Array, claim: Claim) -> Line:
     )
 
 
+def follows(motion: Motion, positions: Array, claim: Claim) -> Line:
+    """Largest distance of the claimed frames' origins from their places on a curve in space."""
+    data = claim.data
+    frames = [motion.robot.frame_index(name) for name in data["frames"]]
+    places, pose = np.asarray(data["places"]), np.asarray(data["pose"])
+    if places.shape != (len(motion.t), len(frames)) or pose.shape not in ((7,), (len(motion.t), 7)):
+        return _failed(claim, f"places {places.shape}, pose {pose.shape} do not belong to the motion's samples")
+    chosen = slice(None, None, -(-places.size // MOST_PLACES))
+    at = places[chosen]
+    points, _ = curves.from_dict(data["curve"]).frames(at.ravel(), IDENTITY)
+    planned = apply(pose if pose.ndim == 1 else pose[chosen, None], points.reshape(*at.shape, 3))
+    off = np.linalg.norm(positions[chosen][:, frames] - planned, axis=-1)
+    worst = np.unravel_index(int(off.argmax()), off.shape)
+    value, limit = float(off[worst]), float(data["tolerance"])
+    detail = f"{len(at)} samples; worst at {motion.t[chosen][worst[0]]:.3g} s, {data['frames'][worst[1]]}"
+    return Line(claim.label, value, limit, "m", value <= limit, detail, kind=claim.kind)
+
+
+def no_slip(motion: Motion, positions: Array, claim: Claim) -> Line:
+    """How the claimed frames' origins move otherwise than along the body at the planned speed, a share of it.
+
+    Velocities are central differences of forward kinematics, the direction of the body at a frame is the chord from the
+    frame behind it to the one ahead; the value is the root mean square over frames and samples.
+    """
+    data = claim.data
+    points = positions[:, [motion.robot.frame_index(name) for name in data["frames"]]]
+    speed = np.asarray(data["speed"])
+    if speed.shape != motion.t.shape or points.shape[1] < 2:
+        return _failed(claim, f"needs a speed a sample and two frames, got {speed.shape} and {points.shape[1]}")
+    chords = np.concatenate([points[:, 1:2] - points[:, :1], points[:, 2:] - points[:, :-2],
+                             points[:, -1:] - points[:, -2:-1]], axis=1)  # fmt: skip
+    sizes = np.linalg.norm(chords, axis=-1)
+    if not sizes.min() > 0.0:
+        return _failed(claim, "two of the frames are in one place")
+    typical = float(np.sqrt(np.mean(np.square(speed))))
+    if len(motion.t) < 3 or typical * float(np.diff(motion.t).max()) > 0.25 * float(sizes.mean()) or not typical > 0.0:
+        return _untested(claim, "too few samples: the body moves by more than half a link between two of them")
+    velocity = (points[2:] - points[:-2]) / (motion.t[2:] - motion.t[:-2])[:, None, None]
+    planned = speed[1:-1, None, None] * chords[1:-1] / sizes[1:-1, :, None]
+    slip = np.linalg.norm(velocity - planned, axis=-1)
+    value, limit = float(np.sqrt(np.mean(np.square(slip)))) / typical, float(data["tolerance"])
+    worst = int(np.mean(np.square(slip), axis=0).argmax())
+    detail = f"root mean square, share of {typical:.3g} m/s; worst frame: {data['frames'][worst]}"
+    return Line(claim.label, value, limit, "", value <= limit, detail, kind=claim.kind)
+
+
+def grips(motion: Motion, positions: Array, claim: Claim) -> Line:
+    """Mean speed of the points of the robot's surface that touch the floor or a pole, a share of a given speed.
+
+    Points: at both ends and the middle of every claimed capsule, and of spheres, where they are nearest to what they
+    touch. Their velocities are central differences of forward kinematics.
+    """
+    data, t = claim.data, motion.t
+    if len(t) < 3:
+        return _untested(claim, "fewer than three samples")
+    pole = data.get("pole")
+    names = data.get("contacts") or [c.name for c in motion.robot.contacts]
+    poses = motion.robot.forward(motion.q, motion.base)
+    total, count = 0.0, 0
+    for contact in motion.robot.contacts:
+        if contact.name not in names or contact.shape not in ("capsule", "sphere"):
+            continue
+        last = contact.end if contact.shape == "capsule" else contact.start
+        pose = poses[contact.frame]
+        for local in np.linspace(contact.start, last, 3 if contact.shape == "capsule" else 1):
+            centre = apply(pose, local)
+            if pole is None:
+                normal = motion.ground.normal(centre)
+                gap = (centre[:, 2] - motion.ground.height(centre)) * normal[:, 2] - contact.radius
+            else:
+                axis = np.asarray(pole["direction"])
+                away = centre - np.asarray(pole["point"])
+                away = away - (away @ axis)[:, None] * axis
+                distance = np.linalg.norm(away, axis=-1)
+                normal, gap = away / distance[:, None], distance - contact.radius - float(pole["radius"])
+            touches = np.flatnonzero(gap[1:-1] <= float(data["height"])) + 1
+            # the same point of the surface a sample before and after
+            here = rotations.rotate(rotations.conjugate(pose[:, 3:]), -contact.radius * normal)[touches] + local
+            after, before = apply(pose[touches + 1], here), apply(pose[touches - 1], here)
+            speeds = np.linalg.norm(after - before, axis=-1) / (t[touches + 1] - t[touches - 1])
+            total, count = total + float(speeds.sum()), count + len(touches)
+    if not count:
+        return _failed(claim, f"nothing comes within {float(data['height']):.3g} m")
+    value, limit = total / count / float(data["speed"]), float(data["tolerance"])
+    detail = f"mean of {count} touching points, share of {float(data['speed']):.3g} m/s"
+    return Line(claim.label, value, limit, "", value <= limit, detail, kind=claim.kind)
+
+
+def _failed(claim: Claim, why: str) -> Line:
+    return Line(claim.label, None, None, "", False, why, kind=claim.kind)
+
+
 def _untested(claim: Claim, why: str) -> Line:
     return Line(claim.label, None, None, "", None, why, kind=claim.kind)
 
@@ -118,6 +214,9 @@ TESTS: dict[str, Callable[[Motion, Array, Claim], Line]] = {
     "at_rest": at_rest,
     "on_curve": on_curve,
     "periodic": periodic,
+    "follows": follows,
+    "no_slip": no_slip,
+    "grips": grips,
 }
 
 #: claims that a general test looks up

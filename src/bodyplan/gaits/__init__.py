@@ -2,8 +2,9 @@
 
 from bodyplan.gaits.base import Gait
 from bodyplan.gaits.concertina import Concertina
+from bodyplan.gaits.serpentine import Serpentine
 
 #: every gait by its name in mission files
-KINDS: dict[str, type[Gait]] = {gait.kind: gait for gait in (Concertina,)}
+KINDS: dict[str, type[Gait]] = {gait.kind: gait for gait in (Concertina, Serpentine)}
 
-__all__ = ["KINDS", "Concertina", "Gait"]
+__all__ = ["KINDS", "Concertina", "Gait", "Serpentine"]
