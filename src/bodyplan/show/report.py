@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bodyplan.errors import InputError, MissingExtraError
+from bodyplan.errors import InputError
 from bodyplan.files import replacing
 from bodyplan.show import sections
+from bodyplan.show.document import document
 from bodyplan.show.execution import execution
 from bodyplan.show.figures import write_figures
 from bodyplan.show.following import following_section
@@ -20,9 +19,9 @@ from bodyplan.show.outcome import Outcome
 from bodyplan.show.overview import head
 from bodyplan.show.playback import Playback
 from bodyplan.show.plots import plots
-from bodyplan.show.scene import scene, script_json
+from bodyplan.show.scene import scene
 from bodyplan.show.schedule import schedule_part
-from bodyplan.show.text import esc, plot, section
+from bodyplan.show.text import plot, section
 
 #: the page's own scripts, in the order in which they run
 SCRIPTS = ("pointer", "timeline", "replay", "plots")
@@ -61,7 +60,6 @@ def _write(outcome: Outcome, playback: Playback, drawn: Mapping[str, str], path:
 
 def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
     """The whole HTML file; ``drawn`` are the figures as SVG by name."""
-    scripts = [WATCH, _plotly(), *(_resource(f"{name}.js") for name in SCRIPTS)]
     parts = {
         "Replay": _replay(playback),
         "Checks": sections.checks(outcome),
@@ -74,67 +72,8 @@ def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
         "Rates": sections.rates(outcome),
         "Notes and data": sections.notes(outcome),
     }
-    return "\n".join(
-        [
-            "<!doctype html>",
-            '<html lang="en"><head><meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{esc(outcome.title)} – bodyplan</title>",
-            f"<style>{_resource('report.css')}</style>",
-            f"<script>{scripts[0]}</script></head>",
-            "<body><main>",
-            head(outcome, playback),
-            _contents(parts),
-            *parts.values(),
-            "</main>",
-            _data("replay-data", script_json(scene(playback))),
-            _data("plots-data", script_json(plots(outcome, playback))),
-            *(f"<script>{script}</script>" for script in scripts[1:]),
-            "</body></html>\n",
-        ]
-    )
-
-
-#: keeps what goes wrong in the page as an attribute of it, where a test or a curious person finds it
-WATCH = (
-    'const note=t=>{const d=document.documentElement.dataset;d.problems=(d.problems?d.problems+" | ":"")+t};'
-    'addEventListener("error",e=>note(e.message||"not loaded"),true);'
-    'addEventListener("unhandledrejection",e=>note(e.reason));'
-    'addEventListener("securitypolicyviolation",e=>note("blocked: "+e.violatedDirective+" "+e.blockedURI));'
-)
-
-
-def _policy(scripts: list[str]) -> str:
-    """Nothing is loaded from anywhere, and no script runs but the report's own, whatever texts a mission
-    holds."""
-    hashes = [base64.b64encode(hashlib.sha256(s.encode("utf-8")).digest()).decode("ascii") for s in scripts]
-    allowed = " ".join(f"'sha256-{h}'" for h in hashes)
-    rules = {
-        "default-src": "'none'",
-        "script-src": allowed,
-        "style-src": "'unsafe-inline'",
-        "img-src": "data: blob:",
-        "base-uri": "'none'",
-        "form-action": "'none'",
-    }
-    return "; ".join(f"{name} {value}" for name, value in rules.items())
-
-
-def _plotly() -> str:
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise MissingExtraError("plotly", "report", "writing a report") from error
-    return str(get_plotlyjs())
-
-
-def _resource(name: str) -> str:
-    return resources.files("bodyplan.show").joinpath(name).read_text(encoding="utf-8")
-
-
-def _data(name: str, text: str) -> str:
-    return f'<script type="application/json" id="{name}">{text}</script>'
+    data = {"replay-data": scene(playback), "plots-data": plots(outcome, playback)}
+    return document(outcome.title, [head(outcome, playback), _contents(parts), *parts.values()], data, SCRIPTS)
 
 
 def _contents(parts: Mapping[str, str]) -> str:

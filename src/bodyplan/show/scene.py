@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from typing import Any
 
 import numpy as np
@@ -57,12 +56,6 @@ def scene(playback: Playback) -> dict[str, Any]:
 def packed(values: Array) -> str:
     """Numbers as base64 of little-endian float32."""
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
-
-
-def script_json(data: Any) -> str:
-    """JSON that may stand inside a script element, whatever texts are in it."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _track(playback: Playback, poses: Array, centre: Array) -> dict[str, Any]:
