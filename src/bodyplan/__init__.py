@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bodyplan import curves, export, fitting, gaits, ground, rates, spatial
     from bodyplan.check import Report, check
-    from bodyplan.curves import BodyCurve, ConcertinaCurve, Segments, Serpenoid, SinusLift, Spiral
+    from bodyplan.curves import BodyCurve, ConcertinaCurve, Sampled, Segments, Serpenoid, SinusLift, Spiral
     from bodyplan.errors import (
         BodyplanError,
         InputError,
@@ -68,6 +68,7 @@ _FACE = {
     "Surface": "ground",
     "BodyCurve": "curves",
     "ConcertinaCurve": "curves",
+    "Sampled": "curves",
     "Segments": "curves",
     "Serpenoid": "curves",
     "SinusLift": "curves",

@@ -9,6 +9,7 @@ from bodyplan.curves.base import BodyCurve, Shape
 from bodyplan.curves.concertina import ConcertinaCurve
 from bodyplan.curves.constant import Constant
 from bodyplan.curves.dynamic import GAMMA_STAR, dynamic_curve, dynamic_slope
+from bodyplan.curves.sampled import Sampled
 from bodyplan.curves.segment_kinds import Bend, Helix, Line
 from bodyplan.curves.segments import Segments
 from bodyplan.curves.serpenoid import Serpenoid
@@ -31,6 +32,7 @@ __all__ = [
     "Constant",
     "Helix",
     "Line",
+    "Sampled",
     "Segments",
     "Serpenoid",
     "Shape",

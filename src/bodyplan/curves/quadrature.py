@@ -22,18 +22,20 @@ if TYPE_CHECKING:
 #: Gauss nodes of a cell
 ORDER = 16
 #: cells kept with a curve, and the most that one call may need
-KEPT, MOST = 4096, 500_000
+KEPT, MOST = 32768, 500_000
 #: rad that the polynomial of a cell may be off, if the halves did not replace it
 TOLERANCE = 1e-14
 #: intervals of one evaluation: keeps the working memory small
 CHUNK = 16384
 
-_NODES, _WEIGHTS = (frozen(values) for values in legendre.leggauss(ORDER))
-# values at the nodes -> Legendre coefficients; and those of the antiderivative from the start of the cell
-_FIT = frozen(0.5 * (2.0 * np.arange(ORDER)[:, None] + 1.0) * legendre.legvander(_NODES, ORDER - 1).T * _WEIGHTS)
-_ANTI = frozen(np.stack([legendre.legint(row, lbnd=-1) for row in np.eye(ORDER)], axis=1))
-# values at the nodes -> values of the polynomial at the nodes of the two halves
-_HALVES = frozen(legendre.legvander(np.concatenate([0.5 * _NODES - 0.5, 0.5 * _NODES + 0.5]), ORDER - 1) @ _FIT)
+#: Gauss-Legendre rule on [-1, 1]
+NODES, WEIGHTS = (frozen(values) for values in legendre.leggauss(ORDER))
+# values at the nodes -> Legendre coefficients
+_FIT = 0.5 * (2.0 * np.arange(ORDER)[:, None] + 1.0) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
+#: values at the nodes -> Legendre coefficients (ORDER + 1, ORDER) of the antiderivative from -1 on
+ANTIDERIVATIVE = frozen(np.stack([legendre.legint(row, lbnd=-1) for row in np.eye(ORDER)], axis=1) @ _FIT)
+#: values at the nodes -> values of the polynomial at the nodes of the two halves
+HALVES = frozen(legendre.legvander(np.concatenate([0.5 * NODES - 0.5, 0.5 * NODES + 0.5]), ORDER - 1) @ _FIT)
 
 
 def shape_integral(curve: BodyCurve, a: ArrayLike, b: ArrayLike) -> Shape:
@@ -65,10 +67,10 @@ class _Table:
         """``edges`` (C + 1,) m of the cells; ``values`` (C, ORDER, 3) rad/m of the shape at their nodes."""
         self.edges, self.values = edges, values
         half = 0.5 * np.diff(edges)
-        self.series = np.einsum("kn,cnj->kjc", _ANTI @ _FIT, values) * half  # (ORDER + 1, 3, C)
+        self.series = np.einsum("kn,cnj->kjc", ANTIDERIVATIVE, values) * half  # (ORDER + 1, 3, C)
         # sums in extended precision where the machine has it: differences of them are what counts
         ends = np.zeros((len(edges), 3), dtype=np.longdouble)
-        np.cumsum(np.einsum("n,cnj,c->cj", _WEIGHTS, values, half), axis=0, dtype=np.longdouble, out=ends[1:])
+        np.cumsum(np.einsum("n,cnj,c->cj", WEIGHTS, values, half), axis=0, dtype=np.longdouble, out=ends[1:])
         self.ends = ends
 
     def between(self, a: Array, b: Array) -> Array:
@@ -135,7 +137,7 @@ def _cells(curve: BodyCurve, low: float, high: float, size: float) -> tuple[Arra
         splits = (starts < middle) & (middle < ends)
         first, last = np.stack([starts, middle], 1).ravel(), np.stack([middle, ends], 1).ravel()
         halves = _sample(curve, first, last)
-        off = np.abs(np.einsum("mn,cnj->cmj", _HALVES, values) - halves.reshape(-1, 2 * ORDER, 3)).max(axis=(1, 2))
+        off = np.abs(np.einsum("mn,cnj->cmj", HALVES, values) - halves.reshape(-1, 2 * ORDER, 3)).max(axis=(1, 2))
         # rounding of the values and, far from 0, of the places
         both = halves.reshape(-1, 2 * ORDER, 3)
         size_, spread = np.abs(both).max(axis=(1, 2)), np.ptp(both, axis=1).max(axis=1)
@@ -155,7 +157,7 @@ def _cells(curve: BodyCurve, low: float, high: float, size: float) -> tuple[Arra
 
 def _sample(curve: BodyCurve, starts: Array, ends: Array) -> Array:
     """Shapes (C, ORDER, 3) at the nodes of cells (C,)."""
-    places = 0.5 * (starts + ends)[:, None] + 0.5 * (ends - starts)[:, None] * _NODES
+    places = 0.5 * (starts + ends)[:, None] + 0.5 * (ends - starts)[:, None] * NODES
     return np.stack(curve.shape(places), axis=-1)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from bodyplan.curves.base import BodyCurve
 from bodyplan.curves.constant import Constant
+from bodyplan.curves.sampled import Sampled
 from bodyplan.curves.segments import Segments
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.curves.sinuslift import SinusLift
@@ -22,7 +23,7 @@ from bodyplan.units import to_si
 #: kind -> class, for every body curve
 KINDS: dict[str, type[BodyCurve]] = {
     curve.kind: curve
-    for curve in (Constant, Segments, Serpenoid, SinusLift, Spiral, Steering, Sum, Transition, Untwisted)
+    for curve in (Constant, Sampled, Segments, Serpenoid, SinusLift, Spiral, Steering, Sum, Transition, Untwisted)
 }
 #: curves inside curves inside ...
 DEEPEST = 16
