@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import finite, number, whole
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.model import Robot
-from bodyplan.robot.snakes import AXES, END_LINK, Units, arcs, doubles, straight
+from bodyplan.robot.snakes import AXES, END_LINK, Parts, Units, arcs, doubles, straight
 
 DENSITY = 1000.0  # kg/m^3, water: what a link weighs when nobody says
 DEGREE = np.pi / 180.0
@@ -83,13 +82,8 @@ def snake(
     if mass is not None:
         weights = np.full(count, number(mass, "mass", above=0.0))
     units = Units(lengths, weights, thick, axes, info, friction)
-    parts = {"straight": straight, "arc": arcs, "double": partial(doubles, end_link=share)}[joint](units)
-    return Robot.from_rows(
-        {"body": parts.elements},
-        contacts=parts.contacts,
-        base_body=parts.base_body,
-        name="snake" if name is None else name,
-    )
+    parts = straight(units) if joint == "straight" else arcs(units) if joint == "arc" else doubles(units, share)
+    return _robot(parts, "snake" if name is None else name)
 
 
 def acm_l2(
@@ -104,28 +98,29 @@ def acm_l2(
     """ACM-L2 (paper *acm*, Table I and section V): a snake of nine two-axis double joints of 78 mm, R_s = 0.18.
 
     18 joint coordinates "yaw1", "pitch1", ..., each within +-75 deg and with 0.5 N m at most; a round body of 50 mm
-    across; 0.99 kg, 0.11 kg a unit. ``joints``: number of units, for longer and shorter ones. ``limits``, ``rate``,
-    ``effort`` and ``friction`` as in :func:`snake`.
+    across. The printed length of 800 mm is 98 mm more than nine joints: a head and a tail that do not bend, here
+    49 mm each. They are the ends of the contacts "link9" and "tail" and no joint's concern; the base is still the
+    rear end of unit 1. They matter: a sinus-lifting body of 702 mm stands on two places at a time and swings about
+    them. The 0.99 kg are spread evenly along the 800 mm.
 
-    The paper prints a length of 800 mm; nine joints make 702 mm. The other 98 mm are the head and the tail, which do
-    not bend. They are left out, their mass is not: the mass is spread evenly along the nine joints.
-
-    Raises InputError for a value out of range.
+    ``joints``: number of units, for longer and shorter robots of the same make. ``limits``, ``rate``, ``effort`` and
+    ``friction`` as in :func:`snake`. Raises InputError for a value out of range.
     """
-    return snake(
-        joints,
-        0.078,
-        "double",
-        axes="universal",
-        end_link=0.18,
+    count = whole(joints, "joints", at_least=1, at_most=MAX_LINKS)
+    unit, tips, kg_per_m = 0.078, 0.049, 0.99 / 0.8
+    units = Units(
+        lengths=np.full(count, unit),
+        masses=np.full(count, kg_per_m * unit),
         radius=0.025,
-        mass=0.11,
-        limits=limits,
-        rate=rate,
-        effort=effort,
+        axes="universal",
+        info={"limits": limits, "rate": rate, "effort": effort},
         friction=friction,
-        name=name,
     )
+    return _robot(doubles(units, END_LINK, tips), name)
+
+
+def _robot(parts: Parts, name: str) -> Robot:
+    return Robot.from_rows({"body": parts.elements}, contacts=parts.contacts, base_body=parts.base_body, name=name)
 
 
 def _lengths(link_length: ArrayLike, count: int) -> Any:

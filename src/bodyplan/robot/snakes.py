@@ -75,20 +75,22 @@ def arcs(units: Units) -> Parts:
     return parts
 
 
-def doubles(units: Units, end_link: float) -> Parts:
+def doubles(units: Units, end_link: float, tips: float = 0.0) -> Parts:
     """Double joints (paper *acm*, Figs. 2 and 9): end link, half of the angles, middle link, the other half, end link.
 
     What lies between the last hinge of a unit and the first one of the next is one rigid part. Masses are spread
-    evenly along each unit.
+    evenly along each unit. ``tips``: length m of a head and of a tail that do not bend, beyond the units and as heavy
+    per length as the unit next to them.
     """
     sizes = _sizes(units)
-    tail, tail_mass = (end_link * x for x in sizes[0])
-    parts = Parts([], [units.capsule("tail", "base", 0.0, tail)], Body(mass=tail_mass, com=(0.5 * tail, 0.0, 0.0)))
+    tail = end_link * sizes[0][0]
+    tail_body = Body(mass=(tail + tips) / sizes[0][0] * sizes[0][1], com=(0.5 * (tail - tips), 0.0, 0.0))
+    parts = Parts([], [units.capsule("tail", "base", tips, tail)], tail_body)
     for i, (length, mass) in enumerate(sizes, start=1):
         end, middle = end_link * length, (1.0 - 2.0 * end_link) * length
         inner = Body(mass=(1.0 - 2.0 * end_link) * mass, com=(-0.5 * middle, 0.0, 0.0))
         # the front end link is one part with the rear end link of the next unit
-        ahead, ahead_mass = (end_link * x for x in sizes[i]) if i < len(sizes) else (0.0, 0.0)
+        ahead, ahead_mass = (end_link * x for x in sizes[i]) if i < len(sizes) else (tips, tips / length * mass)
         end_mass = end_link * mass
         com = 0.5 * (ahead_mass * ahead - end_mass * end) / (end_mass + ahead_mass)
         outer = Body(mass=end_mass + ahead_mass, com=(com, 0.0, 0.0))
