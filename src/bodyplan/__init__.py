@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from bodyplan.export import load, save
-    from bodyplan.fitting import exact_link_length, links_on_curve
+    from bodyplan.fitting import Fit, exact_link_length, fit, links_on_curve
     from bodyplan.gaits import Concertina, Rolling, Serpentine, Sidewinding, SinusLifting
     from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
     from bodyplan.job import run
@@ -73,7 +73,9 @@ _FACE = {
     "Serpenoid": "curves",
     "SinusLift": "curves",
     "Spiral": "curves",
+    "Fit": "fitting",
     "exact_link_length": "fitting",
+    "fit": "fitting",
     "links_on_curve": "fitting",
     "Concertina": "gaits",
     "Rolling": "gaits",

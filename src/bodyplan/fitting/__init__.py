@@ -1,5 +1,7 @@
 """From a body curve to joint angles."""
 
+from bodyplan.fitting.angles import JointAngles
+from bodyplan.fitting.fits import Fit, Turning, fit
 from bodyplan.fitting.links import ExactLength, LinksFit, exact_link_length, links_on_curve
 from bodyplan.fitting.mechanism import Mechanism, mechanism
 from bodyplan.fitting.rules import GAUSS_P, Bends, Rule, rule
@@ -8,10 +10,14 @@ __all__ = [
     "GAUSS_P",
     "Bends",
     "ExactLength",
+    "Fit",
+    "JointAngles",
     "LinksFit",
     "Mechanism",
     "Rule",
+    "Turning",
     "exact_link_length",
+    "fit",
     "links_on_curve",
     "mechanism",
     "rule",

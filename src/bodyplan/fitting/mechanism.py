@@ -49,15 +49,17 @@ class Mechanism:
 
     ``kind``: "straight" (hinges), "arc" (units of constant curvature) or "double" (units of two hinges an axis with
     equal shares). ``length`` m. ``places`` (M,) m: hinges, or the middles of units. ``units`` (M, 2) m: their ends
-    (for hinges the place twice). ``joint_axis`` (n,) 0 pitch or 1 yaw, ``joint_place`` (n,) and ``gain`` (n,), rad of
-    bend per rad of the coordinate: one of each for every joint coordinate, in the robot's order. ``outer`` (M,): the
-    axis of a double joint's outer hinges. ``segments``: the body as lines and arcs between frame origins.
+    (for hinges the place twice). ``hinges`` (M, 2) m: the two of a double joint (else as ``units``). ``joint_axis``
+    (n,) 0 pitch or 1 yaw, ``joint_place`` (n,) and ``gain`` (n,), rad of bend per rad of the coordinate: one of each
+    for every joint coordinate, in the robot's order. ``outer`` (M,): the axis of a double joint's outer hinges.
+    ``segments``: the body as lines and arcs between frame origins.
     """
 
     kind: str
     length: float
     places: Array
     units: Array
+    hinges: Array
     joints: tuple[str, ...]
     joint_axis: IntArray
     joint_place: IntArray
@@ -128,7 +130,7 @@ def _read(robot: Robot) -> Mechanism:
         if len({int(axis[j]) for j in at}) != len(at):
             names = ", ".join(robot.joints[j] for j in at)
             raise _refuse(robot, f"joints {names} bend about the same axis at the same place")
-    outer = np.full(len(ends), YAW, dtype=np.int64)
+    outer, hinges = np.full(len(ends), YAW, dtype=np.int64), ends
     if kind == "double":
         outer = _outer_axes(robot, drives, place, ends)
         ends = _unit_ends(robot, ends, length)
@@ -140,6 +142,7 @@ def _read(robot: Robot) -> Mechanism:
         length,
         frozen(ends.mean(axis=1)),
         frozen(ends),
+        frozen(hinges),
         robot.joints,
         _fixed(axis),
         _fixed(place),
