@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, number
 from bodyplan.curves.base import BodyCurve, Shape
+from bodyplan.curves.quadrature import interval
 from bodyplan.curves.screws import turning_bend_poses
 
 
@@ -55,7 +56,8 @@ class Constant(BodyCurve):
 
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """Exact."""
-        length = np.asarray(finite(b, "b") - finite(a, "a"))
+        first, last = interval(a, b)
+        length = np.asarray(last - first)
         return Shape(self.tau * length, self.kappa_p * length, self.kappa_y * length)
 
     def _poses(self, s: Array) -> Array:

@@ -38,6 +38,16 @@ ANTIDERIVATIVE = frozen(np.stack([legendre.legint(row, lbnd=-1) for row in np.ey
 HALVES = frozen(legendre.legvander(np.concatenate([0.5 * NODES - 0.5, 0.5 * NODES + 0.5]), ORDER - 1) @ _FIT)
 
 
+def interval(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
+    """Ends of intervals, broadcast; InputError where they are not finite or do not fit each other."""
+    first, last = finite(a, "a"), finite(b, "b")
+    try:
+        first, last = np.broadcast_arrays(first, last)
+    except ValueError as error:
+        raise InputError(f"a, b: shapes {first.shape} and {last.shape} do not broadcast.") from error
+    return first, last
+
+
 def shape_integral(curve: BodyCurve, a: ArrayLike, b: ArrayLike) -> Shape:
     """Integrals of ``curve.shape`` from a to b m (broadcast), rad, to 1e-13 or the rounding of the shape itself.
 
@@ -46,10 +56,7 @@ def shape_integral(curve: BodyCurve, a: ArrayLike, b: ArrayLike) -> Shape:
     """
     from bodyplan.curves.base import Shape  # the contract imports this module
 
-    try:
-        first, last = np.broadcast_arrays(finite(a, "a"), finite(b, "b"))
-    except ValueError as error:
-        raise InputError(f"a, b: shapes {np.shape(a)} and {np.shape(b)} do not broadcast.") from error
+    first, last = interval(a, b)
     if not first.size:
         return Shape(np.zeros(first.shape), np.zeros(first.shape), np.zeros(first.shape))
     table = _table(curve, float(min(first.min(), last.min())), float(max(first.max(), last.max())))

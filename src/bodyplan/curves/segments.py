@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, IntArray, finite, frozen
 from bodyplan.curves.base import BodyCurve, Shape
+from bodyplan.curves.quadrature import interval
 from bodyplan.curves.screws import turning_bend_integrals, turning_bend_poses, turning_bends
 from bodyplan.curves.segment_kinds import SEGMENTS, Segment, segment_from
 from bodyplan.errors import InputError
@@ -81,7 +82,8 @@ class Segments(BodyCurve):
 
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """Exact."""
-        (i, x), (j, y) = self._piece(finite(a, "a")), self._piece(finite(b, "b"))
+        first, last = interval(a, b)
+        (i, x), (j, y) = self._piece(first), self._piece(last)
         # within one piece directly, so that short intervals lose nothing
         same = i == j
         direct = self._within(i, x, y)

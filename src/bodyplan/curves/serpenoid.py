@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import finite, number
 from bodyplan.curves.base import BodyCurve, Shape
+from bodyplan.curves.quadrature import interval
 from bodyplan.errors import UnknownNameError
 
 PLANES = ("yaw", "pitch")
@@ -72,7 +73,7 @@ class Serpenoid(BodyCurve):
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """Exact: ``alpha (cos(k a + phase) - cos(k b + phase))``, written as a product so that nothing cancels."""
         k = 2.0 * np.pi / self.wavelength
-        first, last = finite(a, "a"), finite(b, "b")
+        first, last = interval(a, b)
         middle, half = 0.5 * k * (first + last) + self.phase, 0.5 * k * (last - first)
         return self._bends(2.0 * self.alpha * np.sin(middle) * np.sin(half))
 

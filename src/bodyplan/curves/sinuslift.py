@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, finite, number
 from bodyplan.curves.base import BodyCurve, Shape
 from bodyplan.curves.level import level_pitch
+from bodyplan.curves.quadrature import interval
 from bodyplan.errors import InputError
 
 
@@ -75,24 +76,25 @@ class SinusLift(BodyCurve):
 
     def shape(self, s: ArrayLike) -> Shape:
         """See :meth:`BodyCurve.shape`."""
-        k, x = self._angles(s, "s")
+        k, x = self._angles(finite(s, "s"))
         return _bends(k * (self.c1 - self.lift * np.cos(2.0 * x)), k * self.alpha * np.sin(x))
 
     def slope(self, s: ArrayLike) -> Shape:
         """See :meth:`BodyCurve.slope`."""
-        k, x = self._angles(s, "s")
+        k, x = self._angles(finite(s, "s"))
         return _bends(2.0 * k * k * self.lift * np.sin(2.0 * x), k * k * self.alpha * np.cos(x))
 
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """Exact, with differences of angles written as products."""
-        (k, x), (_, y) = self._angles(a, "a"), self._angles(b, "b")
-        turn = k * (finite(b, "b") - finite(a, "a"))
+        first, last = interval(a, b)
+        (k, x), (_, y) = self._angles(first), self._angles(last)
+        turn = k * (last - first)
         pitch = self.c1 * turn - self.lift * np.cos(x + y) * np.sin(turn)
         return _bends(pitch, 2.0 * self.alpha * np.sin(0.5 * (x + y)) * np.sin(0.5 * turn))
 
-    def _angles(self, s: ArrayLike, field: str) -> tuple[float, Array]:
+    def _angles(self, s: Array) -> tuple[float, Array]:
         k = 2.0 * np.pi / self.wavelength
-        return k, np.asarray(k * finite(s, field) + self.phase)
+        return k, np.asarray(k * s + self.phase)
 
 
 def _bends(kappa_p: Array, kappa_y: Array) -> Shape:

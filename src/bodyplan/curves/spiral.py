@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, number
 from bodyplan.curves.base import BodyCurve, Shape
+from bodyplan.curves.quadrature import interval
 from bodyplan.curves.screws import turning_bend_integrals, turning_bend_poses, turning_bends
 
 
@@ -64,7 +65,7 @@ class Spiral(BodyCurve):
 
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """Exact, also where twist is 0."""
-        bends = turning_bend_integrals(self._kappa_p, self._kappa_y, self.twist, finite(a, "a"), finite(b, "b"))
+        bends = turning_bend_integrals(self._kappa_p, self._kappa_y, self.twist, *interval(a, b))
         return Shape(np.zeros(np.shape(bends[0])), *map(np.asarray, bends))
 
     def _poses(self, s: Array) -> Array:

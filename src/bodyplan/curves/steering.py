@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, frozen, number
 from bodyplan.curves.base import BodyCurve, Shape
+from bodyplan.curves.quadrature import interval
 from bodyplan.curves.transition import blend, blend_integral, blend_slope
 from bodyplan.errors import InputError
 
@@ -70,7 +71,7 @@ class Steering(BodyCurve):
 
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """Exact."""
-        first, last = finite(a, "a"), finite(b, "b")
+        first, last = interval(a, b)
         ramps = self._changes * blend_integral(self._progress(first), self._progress(last))
         return _yaw(self.initial * (last - first) + self.width * np.sum(ramps, axis=-1))
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, frozen, number
 from bodyplan.curves.base import BodyCurve, Shape
-from bodyplan.curves.quadrature import shape_integral
+from bodyplan.curves.quadrature import interval, shape_integral
 from bodyplan.errors import InputError
 
 
@@ -98,7 +98,7 @@ class Transition(BodyCurve):
 
     def integral(self, a: ArrayLike, b: ArrayLike) -> Shape:
         """As exact as those of the two curves outside the transition, by quadrature to 1e-13 inside."""
-        first, last = finite(a, "a"), finite(b, "b")
+        first, last = interval(a, b)
         parts = (
             self.before.integral(np.minimum(first, self.at), np.minimum(last, self.at)),
             shape_integral(self, np.clip(first, self.at, self.end), np.clip(last, self.at, self.end)),
