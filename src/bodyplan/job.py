@@ -14,7 +14,7 @@ from functools import lru_cache, partial
 from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from bodyplan.motion import Motion
 from bodyplan.plan import MOST_SAMPLES, plan
 from bodyplan.show.beside import Beside, beside, check_facts
 from bodyplan.show.outcome import Comparison, Grid, GridPoint, Outcome, Variant, figures_of, no_slip_ratio
+
+if TYPE_CHECKING:
+    from bodyplan.show.fit_outcome import FitOutcome
 
 #: fewest samples of a cycle: fewer would not show the motion, whatever dt says
 LEAST_SAMPLES = 100
@@ -277,17 +280,20 @@ class Result:
         return self.outcome.ok
 
 
+#: everything that a fit writes into a folder
+FIT_FILES = ("fit.html", "fit.png", "fit.svg", "angles.csv", "fit.json")
 #: everything that a run writes
 WRITTEN = ("report.html", "figures", "motion.csv", "motion.npz", "robot.xml", "metrics.json", "metrics.schema.json",
            "mission.toml")  # fmt: skip
 
 
-def refuse_existing(path: Path, force: bool) -> None:
-    """InputError where ``path`` is no place for a run: it exists and may not be replaced, or cannot be written."""
+def refuse_existing(path: Path, force: bool, written: Sequence[str] = WRITTEN) -> None:
+    """InputError where ``path`` is no place for a folder of the files ``written``: it exists and may not be replaced,
+    or cannot be written."""
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise InputError(f"{path}: is a file; --out must name a folder.")
     if path.exists():
-        foreign = sorted(p.name for p in path.iterdir() if p.name not in WRITTEN)
+        foreign = sorted(p.name for p in path.iterdir() if p.name not in written)
         if foreign:
             names = ", ".join(foreign[:5])
             raise InputError(f"{path}: holds files that bodyplan did not write ({names}); choose another with --out.")
@@ -313,9 +319,7 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
     """Write every file of a run to a temporary folder beside ``folder``, then move it into place."""
     from bodyplan.show.report import write_report
 
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-    try:
+    with _whole(folder, force, WRITTEN) as scratch:
         motion = outcome.motion
         names = ("motion.csv", "motion.npz", "robot.xml")
         for name in names if find_spec("mujoco") is not None else names[:2]:
@@ -328,9 +332,18 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
         )
         (scratch / "mission.toml").write_text(outcome.mission_text, encoding="utf-8")
         write_report(outcome, scratch)
+
+
+@contextmanager
+def _whole(folder: Path, force: bool, written: Sequence[str]) -> Iterator[Path]:
+    """A temporary folder beside ``folder``, moved into its place when all is written."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    try:
+        yield scratch
         scratch.chmod(0o755)
         if folder.exists():
-            refuse_existing(folder, force)
+            refuse_existing(folder, force, written)
             old = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
             folder.replace(old / folder.name)
             scratch.replace(folder)
@@ -339,3 +352,39 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
             scratch.replace(folder)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+#: suffixes of a fit that is one file
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def fit_target(name: str, out: Path | None, force: bool) -> Path:
+    """Where a fit is written: a page (.html), a picture, or a folder (default ``runs/fit-NAME``). InputError where it
+    cannot be."""
+    target = out if out is not None else Path("runs") / f"fit-{name}"
+    suffix = target.suffix.lower()
+    if suffix not in (".html", *PICTURES):
+        if suffix and not target.is_dir():
+            raise InputError(f"--out {target}: name a folder, or a file ending in .html, .png, .svg or .pdf.")
+        refuse_existing(target, force, FIT_FILES)
+    elif target.is_dir():
+        raise InputError(f"{target}: is a folder; --out names a file here.")
+    elif target.exists() and not force:
+        raise InputError(f"{target}: exists already; choose another place with --out, or --force to replace it.")
+    for library, needed in (("plotly", suffix not in PICTURES), ("matplotlib", suffix != ".html")):
+        if needed and find_spec(library) is None:
+            raise MissingExtraError(library, "report", "drawing a fit")
+    return target
+
+
+def write_fit(outcome: FitOutcome, target: Path, force: bool) -> Path:
+    """Write a fit to the place that :func:`fit_target` gave; returns the file to open."""
+    from bodyplan.show.fit_page import write_fit_figure, write_fit_folder, write_fit_page
+
+    if target.suffix.lower() == ".html":
+        return write_fit_page(outcome, target)
+    if target.suffix.lower() in PICTURES:
+        return write_fit_figure(outcome, target)
+    with _whole(target, force, FIT_FILES) as scratch:
+        page = write_fit_folder(outcome, scratch).name
+    return target / page

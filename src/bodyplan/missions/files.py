@@ -83,7 +83,7 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{where}: not valid TOML: {error}.") from error
     for item in overrides:
-        _override(data, item)
+        override(data, item)
     source = _Source(text, where, tuple(overrides))
     model = source.validate(MissionModel, data, ())
     built = {section: _build(source, model, section, data, folder) for section in SECTIONS}
@@ -158,7 +158,7 @@ def _check_grid(source: _Source, grid: Grid, data: dict[str, Any], folder: Path 
         item = f"{grid.key}={value!r}"
         try:
             changed = copy.deepcopy(data)
-            _override(changed, item)
+            override(changed, item)
             there = _Source(source.text, source.where, (*source.overrides, item))
             model = there.validate(MissionModel, changed, ())
             if model_section(grid.key) in SECTIONS:
@@ -277,11 +277,13 @@ def _line_of(text: str, place: Sequence[str | int]) -> int | None:
     return best
 
 
-def _override(data: dict[str, Any], item: str) -> None:
+def override(data: dict[str, Any], item: str, example: str = "gait.omega=1.2") -> None:
+    """Set a field of a table by a text such as ``example``; InputError where it is not one."""
     key, equals, value = item.partition("=")
-    parts = key.strip().split(".")
+    parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
-        raise InputError(f"--set {item}: expected section.field=value, for example gait.omega=1.2.")
+        form = "section.field=value" if "." in example else "field=value"
+        raise InputError(f"--set {item}: expected {form}, for example {example}.")
     try:
         parsed = tomllib.loads(f"value = {value.strip()}")["value"]
     except tomllib.TOMLDecodeError:

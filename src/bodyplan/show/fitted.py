@@ -19,7 +19,7 @@ SAMPLES = 361
 #: colours of the curve and of the mechanism that follows it
 CURVE, MECHANISM = "#009e73", "#d98200"
 #: picture axes of the three views
-VIEWS = {"top": (0, 1), "side": (0, 2), "front": (1, 2)}
+VIEWS = {"above": (0, 1), "the side": (0, 2), "the front": (1, 2)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Turning:
 @dataclass(frozen=True, eq=False)
 class Drawn:
     """One fit along the body: ``s`` (S,) m from the tail; ``curve`` and ``body`` (S, 3) m points of the curve and of
-    the mechanism; ``joints`` (J, 3) m where it bends (units: their ends), both ends included; ``distance`` (S,) m;
+    the mechanism; ``joints`` (J, 3) m of its hinges, or of the ends of its arcs, and of both ends; ``distance`` (S,) m;
     ``turnings`` of the axes that turn at all; ``error`` E_nm, its ``quadrature_error``, ``max_distance`` m."""
 
     s: Array
@@ -52,7 +52,7 @@ class Drawn:
     def of(cls, fit: Fit, pose: Array | None = None) -> Drawn:
         """The samples of a single fit (not a batch); ``pose`` (7,) places the curve's coordinates in the world."""
         made = mechanism(fit.robot)
-        hinges = made.places if made.kind == "straight" else made.units.ravel()
+        hinges = {"straight": made.places, "arc": made.units, "double": made.hinges}[made.kind].ravel()
         ends = np.unique(np.concatenate([[0.0, made.length], hinges]))
         # a staircase needs both sides of every step
         before = np.clip(hinges * (1.0 - 1e-9), 0.0, made.length)
@@ -84,5 +84,5 @@ class Drawn:
         spread = np.ptp(np.concatenate([self.curve, self.body]), axis=0)
         flat = 1e-9 * max(float(spread.max()), 1e-300)
         if spread[2] <= flat:
-            return ("top",)
-        return ("side",) if spread[1] <= flat else tuple(VIEWS)
+            return ("above",)
+        return ("the side",) if spread[1] <= flat else tuple(VIEWS)

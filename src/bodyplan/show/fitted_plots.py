@@ -31,7 +31,7 @@ def overlay(drawn: Drawn) -> dict[str, Any]:
         left = i * (width + 0.09)
         made[f"xaxis{suffix}"] = {
             **AXIS,
-            "title": {"text": f"{'xyz'[a]} (m), from the {view}" if len(views) > 1 else f"{'xyz'[a]} (m)"},
+            "title": {"text": f"{'xyz'[a]} (m), from {view}" if len(views) > 1 else f"{'xyz'[a]} (m)"},
             "domain": [left, left + width],
             "anchor": f"y{suffix}",
             "nticks": 6,

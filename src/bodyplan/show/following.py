@@ -153,7 +153,7 @@ def following_figure(found: Following | None, new_figure: Callable[[float], Figu
     turning at the first."""
     if found is None or not found.keys:
         return None
-    views = [view for view in ("top", "side") if any(view in drawn.views for drawn in found.keys)]
+    views = [view for view in ("above", "the side") if any(view in drawn.views for drawn in found.keys)]
     made = new_figure(2.1 * len(views) + 2.6)
     heights = [*([2.1] * len(views)), 2.6]
     rows: Any = made.subfigures(len(views) + 1, 1, height_ratios=heights)

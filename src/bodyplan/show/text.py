@@ -50,9 +50,9 @@ def percent(value: float | None) -> str:
     return figure(None if value is None else 100.0 * value, "%", 3, zeros=True)
 
 
-def degrees(angle: float | None) -> str:
+def degrees(angle: float | None, digits: int = 3) -> str:
     """An angle in rad as degrees."""
-    return figure(None if angle is None else math.degrees(angle), "°", 3, zeros=True)
+    return figure(None if angle is None else math.degrees(angle), "°", digits, zeros=True)
 
 
 def unit_of(name: str) -> str:

@@ -1,0 +1,75 @@
+"""What ``bodyplan fit`` found, as plain text for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bodyplan.show.fit_outcome import FitOutcome, saturated
+
+
+def fit_text(outcome: FitOutcome) -> str:
+    """One screen: the angles, how well curve and mechanism match, the other mechanisms beside them."""
+    found = outcome.fit
+    options = ", ".join(f"{k} {_short(v)}" for k, v in outcome.curve.to_dict().items() if k not in ("kind", "points"))
+    parameter = "" if outcome.joint == "straight" else f", p = {found.p:.6g}"
+    pitch, yaw = np.degrees(np.asarray(found.kink)).tolist()
+    angles = [["virtual, yaw", f"{yaw:.6f}"], ["virtual, pitch", f"{pitch:.6f}"]]
+    values = np.degrees(np.asarray(found.q)).tolist()
+    angles += [[name, f"{value:.6f}"] for name, value in zip(found.robot.joints, values, strict=True)]
+    mechanisms = [
+        [
+            r.mechanism + (" *" if r.mine else ""),
+            r.rule,
+            str(r.joints),
+            f"{r.error:.5e}",
+            f"{r.quadrature_error:.0e}",
+            f"{1e3 * r.max_distance:.4g}",
+            r.status,
+        ]
+        for r in outcome.rows
+    ]
+    head = ["mechanism", "rule", "angles", "E_nm", "+-", "largest distance (mm)", "status"]
+    return "\n".join(
+        [
+            f"  curve      {options or f'{len(outcome.curve.breaks)} pieces'}",
+            f"  mechanism  {found.robot.n} angles, axes {outcome.axes}, length {found.length:.6g} m",
+            f"  rule       {found.method}{parameter}; the tail at {float(found.start):.6g} m of the curve",
+            "",
+            *_columns(["joint", "angle (deg)"], angles, 1),
+            "",
+            f"  E_nm       {found.error:.6e} (quadrature error {found.quadrature_error:.0e})",
+            f"  distance   at most {1e3 * found.max_distance:.6g} mm, {found.max_distance / found.length:.3%} of length",
+            *([f"  gain       {found.gain:.4g} of the error of the paper's rule"] if found.method == "optimal" else []),
+            f"  limits     {_limits(outcome)}",
+            "",
+            *_columns(head, mechanisms, 2),
+            *(["", str(outcome.convergence)] if outcome.convergence is not None else []),
+        ]
+    )
+
+
+def _limits(outcome: FitOutcome) -> str:
+    beyond = saturated(outcome.fit)
+    if beyond:
+        return f"at or beyond: {', '.join(beyond)}"
+    return "all joints within" if np.all(np.isfinite(outcome.fit.robot.limits)) else "none given"
+
+
+def _columns(head: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> list[str]:
+    """Lines of a table; the first ``left`` columns are aligned at the left, the others at the right."""
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
+    out = []
+    for row in (head, *rows):
+        cells = [
+            cell.ljust(w) if i < left else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ]
+        out.append("  " + "  ".join(cells))
+    return out
+
+
+def _short(value: Any) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
