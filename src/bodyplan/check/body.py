@@ -10,6 +10,7 @@ from bodyplan.check.report import Line
 from bodyplan.errors import Status
 from bodyplan.motion import Motion
 from bodyplan.robot.elements import Row
+from bodyplan.robot.neighbours import separate_contacts
 
 #: share of a joint's samples whose rate, or acceleration, may disagree with what is around them
 RATE_SLACK, ACCELERATION_SLACK = 0.15, 0.25
@@ -167,7 +168,7 @@ def segment_distance(p: Array, q: Array) -> Array:
 
 
 def self_clearance(motion: Motion) -> Line | None:
-    """Smallest gap between two capsules or spheres that are not on neighbouring links."""
+    """Smallest gap between two capsules or spheres that are no neighbours (``robot/neighbours.py``)."""
     ends, radii, which = _skeletons(motion)
     apart = _separate_pairs(motion, which)
     if not len(apart):
@@ -194,23 +195,9 @@ def self_clearance(motion: Motion) -> Line | None:
 
 
 def _separate_pairs(motion: Motion, which: list[int]) -> IntArray:
-    """Pairs of shapes with at least one whole link between them."""
-    robot = motion.robot
-    place: dict[str, tuple[str, int]] = {}
-    for chain in robot.chains:
-        carrying = [
-            chain.frame_name(i)
-            for i in range(len(chain.elements))
-            if any(c.frame == chain.frame_name(i) for c in robot.contacts)
-        ]
-        place.update({name: (chain.name, i) for i, name in enumerate(carrying)})
-    pairs = []
-    for a in range(len(which)):
-        for b in range(a + 1, len(which)):
-            pa, pb = (place.get(robot.contacts[which[i]].frame) for i in (a, b))
-            near = pa is None or pb is None or (pa[0] == pb[0] and abs(pa[1] - pb[1]) <= 1)
-            if not near:
-                pairs.append((a, b))
+    """Pairs of capsules and spheres that are no neighbours."""
+    place = {contact: i for i, contact in enumerate(which)}
+    pairs = [(place[a], place[b]) for a, b in separate_contacts(motion.robot) if a in place and b in place]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 

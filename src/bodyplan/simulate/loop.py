@@ -10,7 +10,7 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.simulate.library import mujoco
-from bodyplan.simulate.measure import Meter, Records
+from bodyplan.simulate.measure import Meter, Records, Sliding
 from bodyplan.simulate.model import Physics
 from bodyplan.simulate.reference import Reference
 from bodyplan.simulate.start import CLOSING, Walls
@@ -94,7 +94,7 @@ class Run:
     ) -> None:
         self.physics, self.data, self.reference = physics, data, reference
         self.timing, self.walls, self.report = timing, walls, report
-        self.meter = Meter(len(physics.servos))
+        self.meter, self.sliding = Meter(len(physics.servos)), Sliding(physics)
         self.failure = ""
         size = timing.steps // timing.every + 2
         model = physics.model
@@ -181,6 +181,8 @@ class Run:
         i, data = self._count, self.data
         self._t[i], self._com[i], self._force[i] = t, data.subtree_com[1], data.actuator_force
         self._airborne += int(data.ncon == 0)
+        if t >= self.timing.start_time:
+            self.sliding.add(data)
         self._count = i + 1
 
     def _diverged(self) -> str:

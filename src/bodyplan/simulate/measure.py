@@ -14,9 +14,12 @@ from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.model import Physics
 from bodyplan.simulate.reference import Reference
 from bodyplan.simulate.trial import Slip
+from bodyplan.spatial.rotations import conjugate, multiply
 
 #: planned advance a cycle below which a motion is not meant to go anywhere, m
 NOWHERE = 1e-9
+#: horizontal part of a unit axis below which a capsule stands upright
+UPRIGHT = 1e-6
 
 
 class Meter:
@@ -59,6 +62,40 @@ class Meter:
         return out
 
 
+class Sliding:
+    """Horizontal speeds along and across the axes of the capsules that touch the ground, summed over records."""
+
+    def __init__(self, physics: Physics) -> None:
+        mj, model = mujoco(), physics.model
+        self.geoms = np.flatnonzero((model.geom_type == mj.mjtGeom.mjGEOM_CAPSULE) & (model.geom_bodyid > 0))
+        self.bodies = model.geom_bodyid[self.geoms]
+        self.ground = physics.solid_geoms
+        self.along, self.across = 0.0, 0.0
+
+    def add(self, data: Any) -> None:
+        """The state of ``data``, whose contacts and velocities must be those of one instant."""
+        pairs = data.contact.geom[: data.ncon]
+        touching = pairs[np.isin(pairs, self.ground).any(axis=1)]
+        mine = np.isin(self.geoms, touching)
+        if not mine.any():
+            return
+        geoms, moving = self.geoms[mine], data.cvel[self.bodies[mine]]
+        # spatial velocity (omega, v) at the robot's centre of mass, and the way from there
+        away = data.geom_xpos[geoms] - data.subtree_com[1]
+        velocity = (moving[:, 3:] + np.cross(moving[:, :3], away))[:, :2]
+        axis = data.geom_xmat[geoms].reshape(-1, 3, 3)[:, :2, 2]
+        size = np.linalg.norm(axis, axis=1)
+        upright = size < UPRIGHT  # no horizontal axis to slip across
+        ahead = axis / np.maximum(size, UPRIGHT)[:, None]
+        self.along += float(np.abs((velocity * ahead).sum(axis=1))[~upright].sum())
+        self.across += float(np.abs(velocity[:, 1] * ahead[:, 0] - velocity[:, 0] * ahead[:, 1])[~upright].sum())
+
+    @property
+    def angle(self) -> float | None:
+        """rad in [0, pi/2], or None where nothing slid."""
+        return float(np.arctan2(self.across, self.along)) if self.along + self.across > 0.0 else None
+
+
 @dataclass(frozen=True, eq=False)
 class Records:
     """What a run recorded: t (S,), base (S, 7), q (S, n), torque (S, n), com (S, 3)."""
@@ -99,6 +136,23 @@ def progress_of(records: Records, planned: Array, start: float, period: float) -
         "sideways": np.sum(advance * left, axis=1),
         "speed": float(along.sum() / (cycles * period)),
     }
+
+
+def turned_of(
+    records: Records, reference: Reference, phase: Callable[[Array], Array], start: float, period: float, cycles: int
+) -> Array:
+    """Turn (cycles,) rad about z from the planned base to the executed one, mean over the records of each cycle."""
+    out = np.zeros(cycles)
+    for cycle in range(cycles):
+        first = start + cycle * period
+        some = np.flatnonzero((records.t >= first) & (records.t <= first + period))
+        some = some[:: max(1, len(some) // 100)]
+        phases = phase(records.t[some])
+        planned = np.array([reference.base(phase)[3:] for phase in phases]).reshape(-1, 4)
+        w, _, _, z = multiply(records.base[some, 3:], conjugate(planned)).T
+        # turning by the double angle makes q and -q one, and means of angles well defined
+        out[cycle] = np.angle(np.sum((w + 1j * z) ** 2))
+    return out
 
 
 def directions(planned: Array) -> Array:

@@ -83,8 +83,9 @@ def build(
     Contacts touch the ground through explicit pairs: elliptic friction cones, impratio 10, integrator
     implicitfast, time step ``dt`` s. ``friction`` overrides the floor's (not the walls'). Joint coordinates
     that have an actuator get a position servo (N m / rad or N / m, and per rate): ``servo`` as in
-    :func:`default_servo`. ``self_collision`` lets contacts of the robot touch each other unless their
-    frames are next to each other. See :func:`add_robot` for ``armature`` and ``arc_joints``.
+    :func:`default_servo`. ``self_collision`` lets contacts of the robot touch each other unless they
+    are neighbours (:func:`bodyplan.robot.neighbours.separate_contacts`). See :func:`add_robot` for ``armature``
+    and ``arc_joints``.
 
     Raises InputError: a robot without mass or contacts, a wheel-radius drive, inertia that no body can have,
     scale friction where a floor is not a plane or a contact not a capsule.

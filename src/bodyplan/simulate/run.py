@@ -14,7 +14,7 @@ from bodyplan.motion import Motion
 from bodyplan.simulate.friction import FloorFriction, Friction, as_friction
 from bodyplan.simulate.library import mujoco, warnings_kept
 from bodyplan.simulate.loop import Run, Timing
-from bodyplan.simulate.measure import cost_of_transport, planned_advance, progress_of, slips_of
+from bodyplan.simulate.measure import cost_of_transport, planned_advance, progress_of, slips_of, turned_of
 from bodyplan.simulate.model import Physics, Servo, build
 from bodyplan.simulate.reference import Reference, region
 from bodyplan.simulate.start import Walls, on_the_floor
@@ -106,6 +106,8 @@ def simulate(
         positive, absolute = (float(w.sum()) * dt for w in (run.meter.positive, run.meter.absolute))
         weight = float(physics.model.body_mass.sum()) * float(np.linalg.norm(physics.model.opt.gravity))
         measures |= {
+            "turned": turned_of(records, reference, timing.phase, start, period, cycles),
+            "slip_angle": run.sliding.angle,
             "slips": slips_of(motion, records, planned, timing.time_of, period),
             "positive_work": positive,
             "absolute_work": absolute,

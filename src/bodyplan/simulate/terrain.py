@@ -9,6 +9,7 @@ import numpy as np
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Solid
 from bodyplan.robot.model import Robot
+from bodyplan.robot.neighbours import separate_contacts
 from bodyplan.simulate.friction import DEFAULT, Friction, Scales, pair_friction
 from bodyplan.simulate.library import mujoco
 from bodyplan.spatial.rotations import rotate
@@ -74,23 +75,17 @@ def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: floa
 
 
 def add_self_pairs(spec: Any, robot: Robot) -> None:
-    """Pairs of the robot's contacts with each other, except on one frame or on frames next to each other."""
-    near = {
-        frozenset((c.frame_name(i), c.parent if i == 0 else c.frame_name(i - 1)))
-        for c in robot.chains
-        for i in range(len(c.elements))
-    }
-    for i, one in enumerate(robot.contacts):
-        for other in robot.contacts[i + 1 :]:
-            if one.frame != other.frame and frozenset((one.frame, other.frame)) not in near:
-                mu = max((f for f in (one.friction, other.friction) if f is not None), default=DEFAULT)
-                spec.add_pair(
-                    name=f"{one.name} on {other.name}",
-                    geomname1=one.name,
-                    geomname2=other.name,
-                    condim=3,
-                    friction=[mu, mu, 0.0, 0.0, 0.0],
-                )
+    """Pairs of the robot's contacts with each other, except of neighbours (``robot/neighbours.py``)."""
+    for i, j in separate_contacts(robot):
+        one, other = robot.contacts[i], robot.contacts[j]
+        mu = max((f for f in (one.friction, other.friction) if f is not None), default=DEFAULT)
+        spec.add_pair(
+            name=f"{one.name} on {other.name}",
+            geomname1=one.name,
+            geomname2=other.name,
+            condim=3,
+            friction=[mu, mu, 0.0, 0.0, 0.0],
+        )
 
 
 def scales_of(model: Any, robot: Robot, solids: tuple[Solid, ...], friction: Friction) -> Scales:

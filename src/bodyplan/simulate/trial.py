@@ -42,7 +42,13 @@ class Trial:
     ``planned_advance`` (cycles, 3) and ``advance`` (cycles, 3) m: displacement of the centre of mass a
     cycle. ``advance_ratios`` (cycles,): executed over planned, along the planned direction; None where none
     is planned. ``sideways`` (cycles,) m: horizontal, positive to the left of the planned direction.
-    ``speed`` m/s: mean, along the planned direction. ``slips``: see :class:`Slip`.
+    ``speed`` m/s: mean, along the planned direction. ``turned`` (cycles,) rad in (-pi, pi]: how far the base is
+    turned about z from the planned one, mean over each cycle: a body may swing round while it starts and then keep
+    its heading. ``slips``: see :class:`Slip`.
+
+    ``slip_angle`` rad in [0, pi/2]: atan2(sum of \\|v across\\|, sum of \\|v along\\|) of the velocities of the middles
+    of those capsules that touch the ground, horizontal, across and along their axes, over the records of the
+    measured part; lifted parts do not count. 0 for a body that follows its own path; None without capsules.
 
     Per joint, over the measured part and every time step: ``tracking_rms`` and ``tracking_max`` (n,) rad or
     m of target - executed, ``torque_rms`` and ``torque_peak`` (n,). ``positive_work`` J: sum over joints of
@@ -69,6 +75,8 @@ class Trial:
     advance_ratios: Array | None = None
     sideways: Array | None = None
     speed: float | None = None
+    turned: Array | None = None
+    slip_angle: float | None = None
     slips: tuple[Slip, ...] = ()
     tracking_rms: Array | None = None
     tracking_max: Array | None = None
@@ -99,6 +107,17 @@ class Trial:
         return None if self.advance_ratios is None else float(self.advance_ratios.mean())
 
     @property
+    def forward_ratio(self) -> float | None:
+        """Like ``advance_ratio``, but along the planned direction turned by ``turned``: what the body makes of its own
+        heading."""
+        if self.advance_ratios is None or self.advance is None or self.turned is None:
+            return None
+        cos, sin = np.cos(self.turned), np.sin(self.turned)
+        x, y, z = self.planned_advance.T
+        ahead = np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+        return float(np.mean(np.sum(self.advance * ahead, axis=1) / np.sum(np.square(ahead), axis=1)))
+
+    @property
     def peak_torque(self) -> float | None:
         """Largest torque (N m; force in N) of any joint in the measured part; None where the run diverged."""
         return None if self.torque_peak is None else float(self.torque_peak.max(initial=0.0))
@@ -126,6 +145,9 @@ class Trial:
             "planned_speed_m_s": planned / self.period,
             "advance_m": None if self.speed is None else self.speed * self.period,
             "advance_ratio": self.advance_ratio,
+            "forward_ratio": self.forward_ratio,
+            "turned_rad": None if self.turned is None else float(self.turned[-1]),
+            "slip_angle_rad": self.slip_angle,
             "sideways_m": None if self.sideways is None else float(self.sideways.mean()),
             "speed_m_s": self.speed,
         }
