@@ -50,10 +50,8 @@ SLIP = "Slip is the mean move, along the planned advance, of the parts that the 
 def execution(outcome: Outcome, playback: Playback) -> str:
     """What physics made of the plan."""
     trial = outcome.trial
-    advance = plot(
-        "advance",
-        "Advance of the centre of mass along the planned direction. Below: the stages; point at one.",
-    )
+    below = " Below: the stages; point at one." if outcome.motion.stages else ""
+    advance = plot("advance", f"Advance of the centre of mass along the planned direction.{below}")
     title = "Planned and executed"
     if trial is None:
         out = "<p>This motion was not executed in physics, so there is nothing to compare the plan with.</p>"

@@ -32,6 +32,7 @@ def fit_text(outcome: FitOutcome) -> str:
         for r in outcome.rows
     ]
     head = ["mechanism", "rule", "angles", "E_nm", "+-", "largest distance (mm)", "status"]
+    farthest = f"{1e3 * found.max_distance:.6g} mm, {found.max_distance / found.length:.3%} of the length"
     return "\n".join(
         [
             f"  curve      {options or f'{len(outcome.curve.breaks)} pieces'}",
@@ -41,7 +42,7 @@ def fit_text(outcome: FitOutcome) -> str:
             *_columns(["joint", "angle (deg)"], angles, 1),
             "",
             f"  E_nm       {found.error:.6e} (quadrature error {found.quadrature_error:.0e})",
-            f"  distance   at most {1e3 * found.max_distance:.6g} mm, {found.max_distance / found.length:.3%} of length",
+            f"  distance   at most {farthest}",
             *([f"  gain       {found.gain:.4g} of the error of the paper's rule"] if found.method == "optimal" else []),
             f"  limits     {_limits(outcome)}",
             "",
@@ -61,13 +62,11 @@ def _limits(outcome: FitOutcome) -> str:
 def _columns(head: Sequence[str], rows: Sequence[Sequence[str]], left: int) -> list[str]:
     """Lines of a table; the first ``left`` columns are aligned at the left, the others at the right."""
     widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
-    out = []
-    for row in (head, *rows):
-        cells = [
-            cell.ljust(w) if i < left else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
-        ]
-        out.append("  " + "  ".join(cells))
-    return out
+    return ["  " + "  ".join(_aligned(row, widths, left)) for row in (head, *rows)]
+
+
+def _aligned(row: Sequence[str], widths: Sequence[int], left: int) -> list[str]:
+    return [row[i].ljust(w) if i < left else row[i].rjust(w) for i, w in enumerate(widths)]
 
 
 def _short(value: Any) -> str:

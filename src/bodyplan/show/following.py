@@ -14,7 +14,7 @@ from bodyplan.arrays import Array
 from bodyplan.errors import BodyplanError
 from bodyplan.motion import Motion
 from bodyplan.show import fitted_plots
-from bodyplan.show.fitted import Drawn
+from bodyplan.show.fitted import VIEWS, Drawn
 from bodyplan.show.fitted_figures import draw_overlay, draw_turning
 from bodyplan.show.layout import layout, line
 from bodyplan.show.series import EXECUTED, PLANNED
@@ -144,6 +144,8 @@ def _error_plot(found: Following) -> dict[str, Any]:
         "rangemode": "tozero",
         "showgrid": False,
         "automargin": True,
+        "tickmode": "auto",
+        "nticks": 6,
     }
     return {"data": data, "layout": made}
 
@@ -154,16 +156,35 @@ def following_figure(found: Following | None, new_figure: Callable[[float], Figu
     if found is None or not found.keys:
         return None
     views = [view for view in ("above", "the side") if any(view in drawn.views for drawn in found.keys)]
-    made = new_figure(2.1 * len(views) + 2.6)
-    heights = [*([2.1] * len(views)), 2.6]
-    rows: Any = made.subfigures(len(views) + 1, 1, height_ratios=heights)
+    boxes = {view: [_box(drawn, view) for drawn in found.keys] for view in views}
+    # one size for all key times, at the same scale in all views
+    sizes = {view: np.max([high - low for low, high in boxes[view]], axis=0) for view in views}
+    width = max(float(size[0]) for size in sizes.values())
+    heights = [float(np.clip(2.0 * sizes[view][1] / width, 0.5, 3.0)) + 0.75 for view in views]
+    made = new_figure(sum(heights) + 2.8)
+    rows: Any = made.subfigures(len(views) + 1, 1, height_ratios=[*heights, 2.8])
     for view, row in zip(views, rows, strict=False):
-        axes = row.subplots(1, len(found.keys), sharey=True, squeeze=False)[0]
+        axes = row.subplots(1, len(found.keys), squeeze=False)[0]
         for i, (ax, drawn, t) in enumerate(zip(axes, found.keys, found.key_times, strict=True)):
             draw_overlay(ax, drawn, view, named=i == 0)
+            low, high = boxes[view][i]
+            middle, half = 0.5 * (low + high), 0.5 * np.array([width, sizes[view][1]])
+            ax.set_aspect("equal", adjustable="box")
+            ax.set_xlim(middle[0] - half[0], middle[0] + half[0])
+            ax.set_ylim(middle[1] - half[1], middle[1] + half[1])
+            ax.locator_params(axis="x", nbins=4)
+            ax.locator_params(axis="y", nbins=4 if sizes[view][1] > 0.3 * width else 2)
             ax.set_title(f"{t:.2f} s" if view == views[0] else "", fontsize=8)
             ax.tick_params(labelsize=7)
             if i:
                 ax.set_ylabel("")
     draw_turning(rows[-1].subplots(), found.keys[0])
     return made
+
+
+def _box(drawn: Drawn, view: str) -> tuple[Array, Array]:
+    """Corners (2,), (2,) m of a box around curve and mechanism in a view, with some room."""
+    points = np.concatenate([drawn.curve, drawn.body])[:, VIEWS[view]]
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = 0.06 * float((high - low).max())
+    return low - room, high + room
