@@ -2,9 +2,14 @@
 
 from bodyplan.gaits.base import Gait
 from bodyplan.gaits.concertina import Concertina
+from bodyplan.gaits.rolling import Rolling
 from bodyplan.gaits.serpentine import Serpentine
+from bodyplan.gaits.sidewinding import Sidewinding
+from bodyplan.gaits.sinuslifting import SinusLifting
 
 #: every gait by its name in mission files
-KINDS: dict[str, type[Gait]] = {gait.kind: gait for gait in (Concertina, Serpentine)}
+KINDS: dict[str, type[Gait]] = {
+    gait.kind: gait for gait in (Concertina, Serpentine, SinusLifting, Sidewinding, Rolling)
+}
 
-__all__ = ["KINDS", "Concertina", "Gait", "Serpentine"]
+__all__ = ["KINDS", "Concertina", "Gait", "Rolling", "Serpentine", "Sidewinding", "SinusLifting"]

@@ -24,9 +24,8 @@ from bodyplan.spatial.poses import IDENTITY
 if TYPE_CHECKING:
     from bodyplan.fitting import Bends
 
-#: share of a unit by which frames may leave the curve: a mechanism with fewer units than the curve has bends leaves it
-#: by more
-NEAR = 0.25
+#: share of a unit (see :class:`Following`) by which frames may leave the curve: a mechanism that is too coarse for it leaves it by more
+NEAR = 0.5
 #: share of the speed along the body by which its frames may move otherwise (root mean square)
 SLIP = 0.35
 #: samples of the integration that are done again with a wider step
@@ -69,8 +68,19 @@ class Following:
         self.frames: tuple[str, ...] = tuple(robot.frames[i] for i in first)
         #: (F,) m: places of ``frames`` along the body
         self.stations: Array = along[first]
-        #: m: length of a bending unit, or of a link
-        self.unit: float = self.length / len(self.rule.mechanism.places)
+        made = self.rule.mechanism
+        #: m: length of body for every bend about one axis
+        self.unit: float = self.length / min(len(made.joints_of(axis)) for axis in made.axes)
+
+    def must_bend(self, curve: BodyCurve, start: float, gait: str) -> None:
+        """InputError where ``curve`` bends about an axis that no joint of the robot bends about."""
+        mechanism = self.rule.mechanism
+        s = start + np.linspace(0.0, max(self.length, curve.period or 0.0), 257)
+        shape = curve.shape(s)
+        for axis, bends in enumerate((shape.kappa_p, shape.kappa_y)):
+            if axis not in mechanism.axes and float(np.abs(bends).max()) * self.length > 1e-6:
+                name = ("pitch", "yaw")[axis]
+                raise InputError(f"{gait}: the curve bends in {name}, and {self.robot.name!r} has no {name} joints.")
 
     def joints(self, sigma: Array, speed: Array, acceleration: Array) -> Joints:
         """Joints when the tail is at ``sigma`` (T,) m with that speed and acceleration along the curve: chain rule."""
@@ -119,6 +129,13 @@ def in_time(bends: Bends, speed: Array, acceleration: Array) -> Joints:
 def with_kink(poses: Array, kink: Array) -> Array:
     """Poses (T, 7) of the base from those of the curve's frame at the tail and the kinks (T, 4) between them."""
     return compose(poses, np.concatenate([np.zeros((len(kink), 3)), kink], axis=-1))
+
+
+def rolled(angle: Array) -> Array:
+    """Poses (..., 7) rolled by angles (...,) rad about x."""
+    out = np.zeros((*np.shape(angle), 7))
+    out[..., 3], out[..., 4] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return out
 
 
 def rest_on_floor(robot: Robot, ground: Ground, q: Array, base: Array, gait: str) -> tuple[float, Array]:

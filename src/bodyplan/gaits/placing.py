@@ -115,16 +115,16 @@ def place(curve: BodyCurve, start: float, length: float) -> Placing:
         x = first[:, 0]
     if keep == "x":
         x = x / np.linalg.norm(x)
-        z = _across(z, x, first)
+        z = across(z, x, first)
     else:
-        x = _across(x, z, first)
+        x = across(x, z, first)
     turned = np.stack([x, np.cross(z, x), z])  # world from curve
     pose = np.concatenate([-turned @ points[0], quaternion_from_matrix(turned)])
     bend = 0.0 if step is None else float(curve.integral(start, start + span).kappa_y)
     return Placing(pose, None if step is None else float(span), step, bend)
 
 
-def _across(v: Array, axis: Array, frame: Array) -> Array:
+def across(v: Array, axis: Array, frame: Array) -> Array:
     """The unit vector nearest to ``v`` across a unit ``axis``; where ``v`` lies along it, one of the frame's."""
     for candidate in (v, frame[:, 2], frame[:, 1], frame[:, 0]):
         across = candidate - (candidate @ axis) * axis

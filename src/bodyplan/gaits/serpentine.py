@@ -274,8 +274,11 @@ class SerpentineBody:
     def of(cls, gait: Serpentine, robot: Robot) -> SerpentineBody:
         """InputError where the robot follows no curve."""
         before = gait.curve.untwisted()
-        length = Following(robot, before, gait.p).length
+        following = Following(robot, before, gait.p)
+        length = following.length
         course = _course(gait, before, length)
+        for curve in (before, *(after.untwisted() for _, after in gait.changes)):
+            following.must_bend(curve, gait.pace.start, type(gait).__name__)
         first = before + Constant(kappa_y=gait.steer) if isinstance(gait.steer, float) and gait.steer else before
         return cls(gait, Following(robot, course, gait.p), place(first, gait.pace.start, length))
 
@@ -351,7 +354,7 @@ def _course(gait: Serpentine, before: BodyCurve, length: float) -> BodyCurve:
         if ahead:
             return course + Steering(places, values, width)
         earlier = [place - width for place in places[::-1]]
-        return course + Steering(earlier, [*values[-2::-1], 0.0], width, before=values[-1])
+        return course + Steering(earlier, [*values[-2::-1], 0.0], width, initial=values[-1])
     return course + Constant(kappa_y=gait.steer) if gait.steer else course
 
 

@@ -11,25 +11,25 @@ import numpy as np
 
 from bodyplan.arrays import Array, number
 from bodyplan.curves.base import BodyCurve
+from bodyplan.curves.constant import Constant
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.errors import InputError
-from bodyplan.gaits import chassis
 from bodyplan.gaits.base import Gait
-from bodyplan.gaits.following import Following, peaks, rest_on_floor, rule_notes, with_kink
+from bodyplan.gaits.following import Following, Joints, in_time, peaks, rest_on_floor, rolled, rule_notes, with_kink
 from bodyplan.gaits.pace import Pace
-from bodyplan.gaits.placing import NO_TURN, SAMPLES, TOLERANCE
+from bodyplan.gaits.placing import SAMPLES, TOLERANCE, across
 from bodyplan.gaits.serpentine import CLOSED, FINE
 from bodyplan.gaits.touching import touching
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.model import Robot
-from bodyplan.spatial import compose, matrix_from_quaternion, quaternion_from_matrix, twists
+from bodyplan.spatial import compose, quaternion_from_matrix
 from bodyplan.spatial.poses import IDENTITY
 
 #: share of the lift within which a contact counts as touching
 TOUCH = 0.1
 #: share of the speed along the body that what touches may have (mean)
-CREEP = 0.35
+CREEP = 0.4
 
 
 class Sidewinding(Gait):
@@ -37,18 +37,18 @@ class Sidewinding(Gait):
     plane, of one ``wavelength`` m, the pitch wave ahead by ``phase`` rad.
 
     The body runs through the wave at ``speed`` m/s (``direction`` 1: the wave runs tailward), and the wave moves so
-    that the centre line at the lowest point under the body's middle is at rest there: a cycle (wavelength / speed)
-    displaces the body by the curve's step over a wavelength less wavelength times the tangent at the lowest point.
-    **The displacement points along +x**; the body's axis lies at ``direction_angle`` (a fact of the plan) to it. The
-    tail end starts at the world's origin, the lowest contact of the whole motion touches the floor.
+    that the centre line is at rest at its lowest points: a cycle (wavelength / speed) displaces the body by the curve's
+    step over a wavelength less wavelength times the tangent at a lowest point. **The displacement points along +x**; the
+    body's axis lies at ``direction_angle`` (a fact of the plan) to it. The tail end starts at the world's origin, the
+    lowest contact of the whole motion touches the floor.
 
-    Two waves out of phase also roll the curve a little about its axis over every wavelength (to first order pi times
-    the product of the two amplitudes times sin(phase)), and joints that only bend cannot undo it: the body's middle is
-    kept level, the ends lean by a share of that roll (fact ``roll_per_wavelength``).
+    Two waves out of phase roll the curve about its axis over every wavelength, to first order by pi alpha_yaw alpha_pitch
+    sin(phase). A torsion ``.torsion`` (rad/m) undoes that and keeps the wave level. Joints that only bend follow it all
+    the same: their planes of bending are turned, place by place, from the middle of the body on.
 
     ``start`` m: place of the tail end on the wave at t = 0. ``p``: parameter of eqs. (11)-(16) of paper *acm*.
     ``touch`` m: contacts within this height of the floor count as touching (default: a tenth of the lift). Raises
-    InputError for values out of range, or amplitudes for which nothing moves.
+    InputError for values out of range, or amplitudes with which the wave is not level or nothing moves.
     """
 
     kind: ClassVar[str] = "sidewinding"
@@ -101,41 +101,47 @@ class Sidewinding(Gait):
         }
 
     @property
-    def curve(self) -> BodyCurve:
-        """The compound serpenoid."""
-        pitch = Serpenoid(self.alpha_pitch, self.wavelength, self.wavelength, phase=self.phase, plane="pitch")
-        return Serpenoid(self.alpha_yaw, self.wavelength, self.wavelength) + pitch
+    def torsion(self) -> float:
+        """tau, rad/m, that keeps the wave level."""
+        return _levelled(self).torsion
+
+    def curve(self, at: float = 0.0) -> BodyCurve:
+        """The wave from its place ``at`` m on: the compound serpenoid with the torsion that keeps it level."""
+        return _wave(self, self.torsion, at)
 
     def period(self, robot: Robot) -> float:
         """Time of one cycle, s: the wavelength over the speed."""
         return self.wavelength / self.pace.speed
 
     def fit_at(self, robot: Robot, t: float) -> Any:
-        """The :class:`bodyplan.Fit` of the curve at time t s."""
+        """The :class:`bodyplan.Fit` of the wave at time t s; its s = 0 is the middle of the body."""
         from bodyplan.fitting import fit
 
+        middle = 0.5 * _sidewinder(self, robot).following.length
         sigma = float(self.pace.at(np.asarray(number(t, "t", at_least=0.0)))[0])
-        return fit(self.curve, robot, p=self.p, start=sigma)
+        return fit(self.curve(sigma + middle), robot, p=self.p, start=-middle)
 
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
         """The motion at times t (T,) >= 0 s. Raises InputError where the robot can follow no curve or the floor under
         the path is not level; samples beyond a joint limit have the status "limit"."""
         if t[0] < 0.0:
             raise InputError(f"t: the gait starts at t = 0, got {t[0]}.")
-        level = _levelled(self)
-        following = Following(robot, self.curve, self.p)
+        body, level = _sidewinder(self, robot), _levelled(self)
+        following = body.following
         sigma, speed, acceleration = self.pace.at(t)
-        joints = following.joints(sigma, speed, acceleration)
+        joints = body.joints(sigma, speed, acceleration)
         on_curve = following.poses(sigma)
-        path = level.path(sigma, t / self.period(robot), 0.5 * following.length)
-        base = with_kink(compose(path, on_curve), joints.kink)
-        first = self.pace.start
-        tail = compose(level.path(np.array([first]), np.zeros(1), 0.5 * following.length), following.poses(np.array([first])))
-        rise, heights = rest_on_floor(robot, ground, joints.q, base - np.append(tail[0, :2], np.zeros(5)), "Sidewinding")
-        shift = np.array([-tail[0, 0], -tail[0, 1], rise, 0.0, 0.0, 0.0, 0.0])
-        base, path = base + shift, path + shift
+        # the wave starts where the tail end is at the origin
+        first = compose(level.pose, following.poses(np.array([self.pace.start]))[0])
+        path = np.repeat(level.pose[None], len(t), axis=0)
+        path[:, :3] += (t / self.period(robot))[:, None] * level.drift - first[:3]
+        base = with_kink(compose(compose(path, on_curve), rolled(-body.turned(sigma))), joints.kink)
+        rise, heights = rest_on_floor(robot, ground, joints.q, base, "Sidewinding")
+        base[:, 2] += rise
+        path[:, 2] += rise
         lift = float(heights.max(initial=0.0))
         contacts, _, within = touching(heights, TOUCH * lift if self.touch is None else self.touch)
+        # the torsion does not move the points of the curve
         claims = [following.follows(path, sigma[:, None] + following.stations)]
         data = {"period": self.period(robot), "advance": level.advance, "turn": 0.0, "tolerance": CLOSED}
         claims.append(Claim("periodic", "the cycle closes", data))
@@ -144,6 +150,7 @@ class Sidewinding(Gait):
             claims.append(Claim("grips", "what touches the floor is at rest", data))
         notes = rule_notes(following)
         notes.append("The world's x axis is the direction of travel; the body lies at direction_angle to it.")
+        notes.append(f"A torsion of {level.torsion:.4g} rad/m keeps the wave level; planes of bending are turned by it.")
         notes.append(f"Contacts within {within * 1e3:.3g} mm of the floor count as touching.")
         return Motion(
             robot=robot,
@@ -158,13 +165,14 @@ class Sidewinding(Gait):
             status=following.within_limits(joints.q),
             claims=tuple(claims),
             contacts=contacts,
-            facts=self._facts(following, level) | {"lift": lift, "contact_height": within},
+            facts=self._facts(body, level) | {"lift": lift, "contact_height": within},
             notes=tuple(notes),
         )
 
-    def _facts(self, following: Following, level: _Level) -> dict[str, float]:
+    def _facts(self, body: _Sidewinder, level: _Level) -> dict[str, float]:
+        following = body.following
         period = self.period(following.robot)
-        advance = float(np.linalg.norm(level.advance))
+        advance = float(level.advance[0])
         fine = np.linspace(0.0, period, FINE, endpoint=False)
         fit = self.fit_at(following.robot, 0.0)
         return {
@@ -177,91 +185,123 @@ class Sidewinding(Gait):
             "speed_along_body": self.pace.speed,
             "wavelength": self.wavelength,
             "direction_angle": level.angle,
-            "roll_per_wavelength": level.roll,
+            "torsion": level.torsion,
             "body_length": following.length,
-            **peaks(following.joints(*self.pace.at(fine))),
+            **peaks(body.joints(*self.pace.at(fine))),
             "fit_error": float(fit.error),
             "fit_distance": float(fit.max_distance),
         }
 
 
 @dataclass(frozen=True, eq=False)
+class _Sidewinder:
+    """A :class:`Sidewinding` fitted to a robot; ``following`` has the wave without its torsion (the same points)."""
+
+    following: Following
+    torsion: float
+
+    def turned(self, sigma: Array) -> Array:
+        """(T,) rad by which the bends at the tail are turned beyond those of the curve that was untwisted from s = 0:
+        the turn is 0 in the middle of the body."""
+        return -self.torsion * (sigma + 0.5 * self.following.length)
+
+    def joints(self, sigma: Array, speed: Array, acceleration: Array) -> Joints:
+        """The untwisted curve's bends, turned by an angle that changes with sigma: product rule."""
+        nodes, curve = self.following.rule.nodes, self.following.curve
+        begin = sigma[:, None]
+        whole, here, there = curve.integral(begin, begin + nodes), curve.shape(begin), curve.shape(begin + nodes)
+        first, last = curve.slope(begin), curve.slope(begin + nodes)
+        # as complex numbers kappa_p + i kappa_y a turn is a factor
+        phi = whole.kappa_p + 1j * whole.kappa_y
+        phi1 = (there.kappa_p - here.kappa_p) + 1j * (there.kappa_y - here.kappa_y)
+        phi2 = (last.kappa_p - first.kappa_p) + 1j * (last.kappa_y - first.kappa_y)
+        rate = -1j * self.torsion
+        turn = np.exp(1j * self.turned(sigma))[:, None]
+        jets = (turn * phi, turn * (phi1 + rate * phi), turn * (phi2 + 2.0 * rate * phi1 + rate**2 * phi))
+        bends = self.following.rule.apply(*(np.stack([jet.real, jet.imag], axis=-1) for jet in jets))
+        return in_time(bends, speed, acceleration)
+
+
+@lru_cache(maxsize=16)
+def _sidewinder(gait: Sidewinding, robot: Robot) -> _Sidewinder:
+    following = Following(robot, gait.curve(), gait.p)
+    following.must_bend(following.curve, gait.pace.start, "Sidewinding")
+    return _Sidewinder(following, gait.torsion)
+
+
+def _wave(gait: Sidewinding, torsion: float, at: float = 0.0) -> BodyCurve:
+    wave = gait.wavelength
+    ahead = 2.0 * np.pi / wave * at
+    pitch = Serpenoid(gait.alpha_pitch, wave, wave, phase=gait.phase + ahead, plane="pitch")
+    return Serpenoid(gait.alpha_yaw, wave, wave, phase=ahead) + pitch + Constant(tau=torsion, length=wave)
+
+
+@dataclass(frozen=True, eq=False)
 class _Level:
-    """The wave laid level, at rest at its lowest points.
+    """The wave laid level, at rest at its lowest points. ``torsion`` rad/m; ``pose`` (7,) of its frame at s = 0;
+    ``advance`` (3,) m: how far the body moves a cycle, along x; ``drift`` (3,) m: how far the wave does; ``angle`` rad
+    from the body's axis to the advance, positive to the left."""
 
-    Over a wavelength the curve repeats by a screw motion with ``turn`` and ``step`` (3,), seen from its frame at
-    s = 0. ``pose`` (7,) of that frame once the screw is undone: it has the axis level. ``advance`` (3,) m a cycle.
-    ``angle`` rad from the body's axis to the advance, positive to the left; ``roll`` rad about the axis over a
-    wavelength.
-    """
-
-    wavelength: float
-    step: Array
-    turn: Array
+    torsion: float
     pose: Array
     advance: Array
+    drift: Array
     angle: float
-    roll: float
-
-    def path(self, sigma: Array, cycles: Array, middle: float) -> Array:
-        """Poses (T, 7) of the curve's frame at s = 0: the curve is screwed back as the body runs through it, so that
-        the place ``middle`` m of the body stays upright, and moves on by ``advance`` a cycle."""
-        out = compose(self.pose, chassis.part_of(self.step, self.turn, -(sigma + middle) / self.wavelength))
-        out[:, :3] += cycles[:, None] * self.advance
-        return out
 
 
 @lru_cache(maxsize=16)
 def _levelled(gait: Sidewinding) -> _Level:
-    curve, wave = gait.curve, gait.wavelength
+    wave = gait.wavelength
+    torsion = _torsion(gait)
+    curve = _wave(gait, torsion)
     at = wave * np.arange(SAMPLES + 1) / SAMPLES
-    points, rotations = curve.frames(at, IDENTITY, tolerance=TOLERANCE)
-    # log of the step over a wavelength: the curve repeats by exp of it
-    screw = twists.log(np.concatenate([points[-1], quaternion_from_matrix(rotations[-1])]))
-    if np.linalg.norm(screw[3:]) <= NO_TURN:
-        screw = np.concatenate([points[-1], np.zeros(3)])
-    v, turn = screw[:3], screw[3:]
-    step = twists.exp(screw)[:3]
-
-    def periodic(s: Array) -> tuple[Array, Array, Array]:
-        """Points, their derivatives by s, and e_y, all with the screw undone: they repeat with the wavelength."""
-        p, R = curve.frames(s, IDENTITY, tolerance=TOLERANCE)
-        back = twists.exp(-(s / wave)[:, None] * screw)
-        Q = matrix_from_quaternion(back[:, 3:])
-        P = np.einsum("sij,sj->si", Q, p) + back[:, :3]
-        slope = np.einsum("sij,sj->si", Q, R[:, :, 0]) - (np.cross(turn, P) + v) / wave
-        return P, slope, np.einsum("sij,sj->si", Q, R[:, :, 2])
-
-    P, slope, up = periodic(at)
-    ahead = points[-1] if not turn.any() else (turn @ points[-1]) * turn
-    if np.linalg.norm(ahead) <= 1e-9 * wave * max(1.0, float(turn @ turn)):
+    points, frames = curve.frames(at, IDENTITY, tolerance=TOLERANCE)
+    step = points[-1]
+    if np.linalg.norm(step) <= 1e-9 * wave:
         raise InputError("alpha_yaw, alpha_pitch: with these the wave goes nowhere; choose smaller amplitudes.")
-    x = ahead / np.linalg.norm(ahead)
-    z = up[:-1].mean(axis=0)
-    z = z - (z @ x) * x
-    z /= np.linalg.norm(z)
-    k = int((P[:-1] @ z).argmin())
+    x = step / np.linalg.norm(step)
+    z = across(frames[:-1, :, 2].mean(axis=0), x, frames[0])
+    k = int((points[:-1] @ z).argmin())
     low, high = at[k] - wave / SAMPLES, at[k] + wave / SAMPLES
-    for _ in range(8):
+    for _ in range(8):  # closes in on where the tangent is level, from falling to rising
         s = np.linspace(low, high, 33)
-        rising = np.flatnonzero(periodic(s)[1] @ z > 0.0)
-        i = int(rising[0]) if len(rising) else 32
+        tangents = curve.frames(s, IDENTITY, tolerance=TOLERANCE)[1][:, :, 0]
+        rising = np.flatnonzero(tangents @ z > 0.0)
+        i = int(rising[0]) if len(rising) else len(s) - 1
         low, high = s[max(i - 1, 0)], s[i]
-    here = periodic(np.array([0.5 * (low + high)]))[1][0]
-    advance = -gait.pace.direction * wave * here
-    advance -= (advance @ z) * z  # rounding
+    lowest = curve.frames(np.array([0.5 * (low + high)]), IDENTITY, tolerance=TOLERANCE)[1][0, :, 0]
+    drift = -gait.pace.direction * wave * lowest
+    drift -= (drift @ z) * z  # rounding
+    advance = gait.pace.direction * step + drift
     size = float(np.linalg.norm(advance))
     if size <= 1e-9 * wave:
         raise InputError("alpha_yaw, alpha_pitch, phase: the lowest points run along with the body; nothing moves.")
     heading = advance / size
-    turned = np.stack([heading, np.cross(z, heading), z])  # world from curve
     left = np.cross(z, x)
-    return _Level(
-        wave,
-        step,
-        turn,
-        np.concatenate([np.zeros(3), quaternion_from_matrix(turned)]),
-        np.array([size, 0.0, 0.0]),
-        float(np.arctan2(heading @ left, heading @ x)),
-        float(turn @ x),
-    )
+    turned = np.stack([heading, np.cross(z, heading), z])  # world from curve
+    pose = np.concatenate([np.zeros(3), quaternion_from_matrix(turned)])
+    angle = float(np.arctan2(heading @ left, heading @ x))
+    return _Level(torsion, pose, np.array([size, 0.0, 0.0]), turned @ drift, angle)
+
+
+def _torsion(gait: Sidewinding) -> float:
+    """The torsion with which the frame after a wavelength is the first one.
+
+    After half a wavelength both curvatures have changed sign, as if the frame had rolled by pi: with H the rotation over
+    half a wavelength, that over a whole one is (H Rx(pi))^2. It is the identity where H Rx(pi) turns by pi, so where the
+    quaternion of H has no x: one equation for one torsion.
+    """
+    from scipy.optimize import brentq
+
+    wave = gait.wavelength
+
+    def roll(torsion: float) -> float:
+        frame = _wave(gait, torsion).frames(np.array([0.5 * wave]), IDENTITY, tolerance=1e-13)[1][0]
+        return float(quaternion_from_matrix(frame)[1])
+
+    # to first order the roll over a wavelength is pi times the product of the amplitudes
+    reach = 2.0 * np.pi * (abs(gait.alpha_yaw * gait.alpha_pitch) + 1e-6) / wave
+    if roll(-reach) * roll(reach) >= 0.0:
+        raise InputError("alpha_yaw, alpha_pitch: no torsion keeps a wave of these amplitudes level; choose smaller ones.")
+    found: float = brentq(roll, -reach, reach, xtol=1e-15 / wave, rtol=1e-14)
+    return found

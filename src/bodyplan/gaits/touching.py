@@ -6,6 +6,7 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.robot.model import Robot
+from bodyplan.spatial import apply
 
 #: samples handled at once
 CHUNK = 20_000
@@ -43,3 +44,19 @@ def touching(heights: Array, within: float | None) -> tuple[BoolArray | None, fl
         return None, lift, FLAT
     limit = TOUCH * lift if within is None else within
     return heights <= limit, lift, limit
+
+
+def pole_gaps(robot: Robot, q: Array, base: Array, point: Array, direction: Array, radius: float) -> Array:
+    """Distances (T, c) m of capsules and spheres from a pole: a straight line through ``point`` along the unit vector
+    ``direction``, of that ``radius``. Capsules are tried at 5 places."""
+    out = np.empty((len(q), len(robot.contacts)))
+    for first in range(0, len(q), CHUNK):
+        part = slice(first, first + CHUNK)
+        poses = robot.forward(q[part], base[part])
+        for k, contact in enumerate(robot.contacts):
+            ends = contact.points()
+            tried = ends[:1] + np.linspace(0.0, 1.0, 5)[:, None] * (ends[-1:] - ends[:1])
+            away = apply(poses[contact.frame][:, None], tried) - point
+            away -= (away @ direction)[..., None] * direction
+            out[part, k] = np.linalg.norm(away, axis=-1).min(axis=1) - contact.radius - radius
+    return out
