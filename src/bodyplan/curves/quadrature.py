@@ -122,8 +122,7 @@ def _table(curve: BodyCurve, low: float, high: float) -> _Table:
 
 def _first_cell(curve: BodyCurve) -> float:
     """Length m of a cell before it is halved."""
-    period = curve.period
-    return 0.25 * period if period else 0.25 * curve.length
+    return 0.25 * min(curve.period or curve.length, curve.length)
 
 
 def _cells(curve: BodyCurve, low: float, high: float, size: float) -> tuple[Array, Array]:
