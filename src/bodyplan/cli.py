@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -351,6 +352,10 @@ def _summary(result: Result) -> None:
                 f"peak torque {_figure(row.peak_torque, 'N m')}, "
                 f"cost of transport {_figure(row.cost_of_transport, '')}"
             )
+            if row.no_slip_ratio is not None:
+                angle = "" if row.slip_angle is None else f", slip angle {math.degrees(row.slip_angle):.3g} deg"
+                own = "" if row.forward_ratio is None else f", {row.forward_ratio:.1%} along its own heading"
+                typer.echo(f"             {row.no_slip_ratio:.1%} of the speed without slip{own}{angle}")
         else:
             _say(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
         warnings += trial.warnings

@@ -143,6 +143,7 @@ def grid_point(text: str, name: str, key: str, value: float) -> GridPoint:
         row.peak_torque,
         row.cost_of_transport,
         row.slip_angle,
+        row.forward_ratio,
     )
 
 

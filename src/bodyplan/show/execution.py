@@ -28,6 +28,7 @@ from bodyplan.simulate.trial import Trial
 MANY = 8
 #: key of Trial.metrics -> (what it is, unit)
 MEASURES = {
+    "turned_rad": ("turned to the left of the planned heading, last cycle", "°"),
     "slip_angle_rad": ("slip angle: how far the body moves across its own axis", "°"),
     "tracking_rms_rad": ("servo error, rms", "rad"),
     "tracking_max_rad": ("servo error, largest", "rad"),
@@ -95,6 +96,11 @@ def _figures(trial: Trial, playback: Playback) -> list[tuple[str, str, str, str]
     rows.append(("speed", figure(speed, "m/s"), figure(reached, "m/s"), percent(share)))
     drift = "drift to the left" + (" a cycle" if cyclic else "")
     rows.append((drift, figure(0.0, "m"), figure(found["sideways_m"], "m"), ""))
+    own = found.get("forward_ratio")
+    if own is not None:
+        rows.append(
+            ("advance along the heading that it took itself", figure(mean, "m"), figure(own * mean, "m"), percent(own))
+        )
     ratio = no_slip_ratio(playback.motion, trial)
     if ratio is not None:
         no_slip = playback.motion.facts["no_slip_speed"]

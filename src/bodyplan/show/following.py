@@ -30,8 +30,9 @@ SAMPLES, KEYS = 25, 4
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Fits of the motion's curve over a cycle: at times ``t`` (k,) s the ``error`` E_nm and the ``distance`` m, largest
-    along the body; ``keys`` at times ``key_times`` s, placed in the world; ``length`` m of the body."""
+    """Fits of the motion's curve over a cycle (or over a motion that runs once, not ``cyclic``): at times ``t`` (k,) s
+    the ``error`` E_nm and the ``distance`` m, largest along the body; ``keys`` at times ``key_times`` s, placed in the
+    world; ``length`` m of the body; ``problem``: why there is none of that."""
 
     t: Array
     error: Array
@@ -40,11 +41,13 @@ class Following:
     key_times: Array
     keys: tuple[Drawn, ...]
     length: float
+    cyclic: bool
     problem: str = ""
 
     @classmethod
-    def of(cls, motion: Motion, span: float) -> Following | None:
-        """Measured over ``span`` s from the motion's beginning; None for a gait that does not follow a curve."""
+    def of(cls, motion: Motion, span: float, cyclic: bool) -> Following | None:
+        """Measured over ``span`` s from the motion's beginning (``cyclic``: it is a cycle); None for a gait that does
+        not follow a curve."""
         kind = motion.gait.get("kind")
         planner = gaits.KINDS.get(kind) if isinstance(kind, str) else None
         if planner is None or not hasattr(planner, "fit_at"):
@@ -65,12 +68,11 @@ class Following:
                 for name in ("error", "quadrature_error", "max_distance")
             )
         except BodyplanError as failed:  # a report is worth having without this part
-            return cls(none, none, none, none, none, (), 0.0, str(failed))
+            return cls(none, none, none, none, none, (), 0.0, cyclic, str(failed))
         t0 = motion.t[0]
         length = float(drawn[0].s[-1])
-        return cls(
-            motion.t[chosen] - t0, error, quadrature, distance, motion.t[np.unique(shown)] - t0, tuple(drawn), length
-        )
+        key_times = motion.t[np.unique(shown)] - t0
+        return cls(motion.t[chosen] - t0, error, quadrature, distance, key_times, tuple(drawn), length, cyclic)
 
 
 def following_section(found: Following | None, pictures: Mapping[str, str]) -> str:
@@ -103,8 +105,8 @@ def in_words(found: Following) -> str:
     small, large = float(found.error.min()), float(found.error.max())
     between = f"between {figure(small)} and {figure(large)}" if large > 1.001 * small else f"{figure(large)} throughout"
     return (
-        f"Over the cycle the mean distance between mechanism and curve, as a share of the body’s length (E_nm), is "
-        f"<b>{between}</b>. The largest distance is <b>{figure(float(found.distance[worst]), 'm')}</b> "
+        f"Over the {'cycle' if found.cyclic else 'motion'} the mean distance between mechanism and curve, as a share of "
+        f"the body’s length (E_nm), is <b>{between}</b>. The largest distance is <b>{figure(float(found.distance[worst]), 'm')}</b> "
         f"({percent(float(found.distance[worst]) / found.length)} of the body), at "
         f"{figure(float(found.t[worst]), 's', 3)}."
     )
@@ -155,7 +157,9 @@ def following_figure(found: Following | None, new_figure: Callable[[float], Figu
     turning at the first."""
     if found is None or not found.keys:
         return None
-    views = [view for view in ("above", "the side") if any(view in drawn.views for drawn in found.keys)]
+    spread = np.ptp(found.keys[0].body, axis=0)
+    along = "the side" if spread[0] >= spread[1] else "the front"
+    views = [view for view in ("above", along) if any(view in drawn.views for drawn in found.keys)]
     boxes = {view: [_box(drawn, view) for drawn in found.keys] for view in views}
     # one size for all key times, at the same scale in all views
     sizes = {view: np.max([high - low for low, high in boxes[view]], axis=0) for view in views}

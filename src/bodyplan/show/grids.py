@@ -23,13 +23,14 @@ def grid_section(grid: Grid | None, mission: str) -> str:
     """The grid as a part of the report; empty where there is none."""
     if grid is None:
         return ""
-    head = (esc(grid.label), "mission", "executed / planned", "speed", "executed / no-slip speed", "peak torque",
-            "cost of transport", "slip angle", "status")  # fmt: skip
+    head = (esc(grid.label), "mission", "executed / planned", "along its own heading", "speed",
+            "executed / no-slip speed", "peak torque", "cost of transport", "slip angle", "status")  # fmt: skip
     rows = [
         (
             figure(point.value),
             f"<b>{esc(point.mission)}</b>" if point.mission == mission else esc(point.mission),
             percent(point.advance_ratio),
+            percent(point.forward_ratio),
             figure(point.speed, "m/s", 3),
             figure(point.no_slip_ratio, digits=3, zeros=True),
             figure(point.peak_torque, "N m", 3),
@@ -43,7 +44,7 @@ def grid_section(grid: Grid | None, mission: str) -> str:
     ]
     said = "".join(f"<p>{esc(text)}</p>" for text in in_words(grid, mission))
     about = f"<p>Planned and executed once more at every value of <code>{esc(grid.key)}</code>.</p>"
-    content = about + said + plot("grid") + table(head, rows, kind="grid", numbers=(0, 2, 3, 4, 5, 6, 7))
+    content = about + said + plot("grid") + table(head, rows, kind="grid", numbers=(0, 2, 3, 4, 5, 6, 7, 8))
     return section("grid", esc(f"Over {grid.label}"), content)
 
 

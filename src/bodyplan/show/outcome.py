@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Comparison:
     """Figures of another mission, run the same way: advance executed / planned, speeds in m/s, torque in N m, slip
-    angle in rad, executed over no-slip speed; ``figures``: every number of :func:`figures_of`."""
+    angle in rad, executed over no-slip speed, advance along the body's own heading over planned; ``figures``: every
+    number of :func:`figures_of`."""
 
     name: str
     title: str
@@ -36,6 +37,7 @@ class Comparison:
     status: str
     slip_angle: float | None = None
     no_slip_ratio: float | None = None
+    forward_ratio: float | None = None
     figures: Mapping[str, float | None] = field(default_factory=dict)
 
     @classmethod
@@ -59,6 +61,7 @@ class Comparison:
             trial.status,
             metrics.get("slip_angle_rad"),
             no_slip_ratio(motion, trial),
+            metrics.get("forward_ratio"),
             figures,
         )
 
@@ -96,6 +99,7 @@ class GridPoint:
     peak_torque: float | None = None
     cost_of_transport: float | None = None
     slip_angle: float | None = None
+    forward_ratio: float | None = None
 
 
 @dataclass(frozen=True)

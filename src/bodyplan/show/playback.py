@@ -88,7 +88,7 @@ class Playback:
     @cached_property
     def following(self) -> Following | None:
         """How the mechanism follows its curve over a cycle; None for a gait that follows none."""
-        return Following.of(self.motion, self.span)
+        return Following.of(self.motion, self.span, self.period is not None)
 
     def advance(self, centre: Array) -> Array:
         """How far (k,) m centres of mass (k, 3) at the first k times have come along the planned direction

@@ -60,8 +60,9 @@ def _write(outcome: Outcome, playback: Playback, drawn: Mapping[str, str], path:
 
 def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
     """The whole HTML file; ``drawn`` are the figures as SVG by name."""
+    replayed = scene(playback)
     parts = {
-        "Replay": _replay(playback),
+        "Replay": _replay(playback, curve=replayed["path"] is not None),
         "Checks": sections.checks(outcome),
         "Planned and executed": execution(outcome, playback),
         "Comparison": sections.comparison(outcome),
@@ -72,7 +73,7 @@ def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
         "Rates": sections.rates(outcome),
         "Notes and data": sections.notes(outcome),
     }
-    data = {"replay-data": scene(playback), "plots-data": plots(outcome, playback)}
+    data = {"replay-data": replayed, "plots-data": plots(outcome, playback)}
     return document(outcome.title, [head(outcome, playback), _contents(parts), *parts.values()], data, SCRIPTS)
 
 
@@ -83,12 +84,12 @@ def _contents(parts: Mapping[str, str]) -> str:
     return f'<nav aria-label="Contents">{links}</nav>'
 
 
-def _replay(playback: Playback) -> str:
+def _replay(playback: Playback, *, curve: bool) -> str:
     executed = playback.executed is not None
     toggles = [("planned", "planned", "planned")]
     if executed:
         toggles.append(("executed", "executed", "executed"))
-    if any(claim.kind == "follows" for claim in playback.motion.claims):
+    if curve:
         toggles.append(("curve", "curve", "curve"))
     toggles += [("trail", "trail", ""), ("follow", "follow", "")]
     boxes = "".join(

@@ -73,7 +73,7 @@ def comparison(outcome: Outcome) -> str:
     compared = (outcome.itself, *outcome.others)
     slips = any(other.slip_angle is not None for other in compared)
     paced = any(other.no_slip_ratio is not None for other in compared)
-    head += ("slip angle",) * slips + ("speed / no-slip speed",) * paced
+    head += ("slip angle",) * slips + ("speed / no-slip speed", "along its own heading") * paced
     rows = [_compared(other, i == 0, slips, paced) for i, other in enumerate(compared)]
     return section(
         "comparison", "Beside other missions", table(head, rows, kind="compare", numbers=range(2, len(head)))
@@ -92,7 +92,7 @@ def _compared(other: Comparison, mine: bool, slips: bool, paced: bool) -> tuple[
         figure(other.peak_torque, "N m"),
         figure(other.cost_of_transport, digits=3, zeros=True),
         *((degrees(other.slip_angle),) if slips else ()),
-        *((percent(other.no_slip_ratio),) if paced else ()),
+        *((percent(other.no_slip_ratio), percent(other.forward_ratio)) if paced else ()),
     )
 
 
