@@ -91,7 +91,7 @@ class Fit:
         """Length of the robot, L_t, m."""
         return self._mechanism.length
 
-    def _out(self, values: Array) -> Any:
+    def _out(self, values: Any) -> Any:
         """(curves, starts, ...) in the batch shape."""
         return values.reshape(self._shape + values.shape[2:])
 
@@ -207,7 +207,7 @@ class Fit:
     @cached_property
     def _excess(self) -> Array:
         low, high = self.robot.limits.T
-        return np.maximum(self._q - high, low - self._q)
+        return np.asarray(np.maximum(self._q - high, low - self._q))
 
     @property
     def excess(self) -> Array:

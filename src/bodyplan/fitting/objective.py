@@ -1,0 +1,120 @@
+"""E_nm of eq. (6) as a function of joint angles and kink, with its exact gradient."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bodyplan.arrays import Array
+from bodyplan.fitting.distance import CELL_TOLERANCE, integrate
+from bodyplan.fitting.following import Following, segment_data
+from bodyplan.fitting.rules import kink_quaternion
+from bodyplan.robot.elements import Arc, Joint
+from bodyplan.spatial import compose, left_jacobian, matrix_from_quaternion
+
+
+class Objective:
+    """E_nm of fit number ``index`` of a :class:`Following` as a function of x (n + k,): the joint coordinates, then the
+    kink about the ``axes`` that the mechanism has.
+
+    The integral is that of the accurate error, adaptive cells and all. Its gradient is that of the integrand: unit
+    vectors from the curve to the body pull at the frames, and the robot's Jacobians turn that into joint space.
+    """
+
+    def __init__(self, following: Following, index: int, axes: tuple[int, ...]) -> None:
+        one = slice(index, index + 1)
+        self._robot, self._made, self._dense = following.robot, following.made, following.dense
+        self._start = float(following.starts[index])
+        count = int(following.counts[index])
+        self._stops = np.ascontiguousarray(following.stops[index, : count + 1])
+        self._owners = np.ascontiguousarray(following.owners[index, :count])
+        self._segments = following.segments
+        self._tail = self._dense.pose(following.starts[one])
+        self._axes = list(axes)
+        self.n = self._robot.n
+        segments = self._made.segments
+        self._first = np.array([s.first for s in segments])
+        self._arc = np.array([s.arc for s in segments])
+        # frames that something pulls at, without the base
+        self._frames = np.unique(np.concatenate([self._first, self._first[~self._arc] + 1]))
+        self._frames = self._frames[self._frames > 0]
+        self._names = tuple(self._robot.frames[f] for f in self._frames)
+        column = {name: i for i, name in enumerate(self._robot.joints)}
+        bends = []  # segment, 0 pitch or 1 yaw, joint, scale
+        for i, s in enumerate(segments):
+            element = self._robot.elements[s.first]
+            if isinstance(element, Arc):
+                for k, bend in enumerate((element.pitch, element.yaw)):
+                    if isinstance(bend, Joint):
+                        bends.append((i, 6 + k, column[bend.name], bend.scale))
+        self._bends = bends
+
+    def full_kink(self, x: Array) -> Array:
+        """(pitch, yaw) rad."""
+        kink = np.zeros(2)
+        kink[self._axes] = x[self.n :]
+        return kink
+
+    def __call__(self, x: Array) -> tuple[float, Array]:
+        """(E_nm, its gradient (n + k,))."""
+        q, kink = np.ascontiguousarray(x[: self.n]), self.full_kink(x)
+        hinged = self._made.kind == "straight"
+        turn = kink_quaternion(kink, hinged)
+        base = compose(self._tail, np.concatenate([np.zeros(3), turn])[None])
+        data = segment_data(self._robot, self._made, q[None], base)[0]
+        wrenches = np.empty((len(self._segments), 8))
+        size = self._made.length**2
+        cells = (self._segments, data, self._dense.ends, self._dense.cells)
+        total, _ = integrate(self._start, self._stops, self._owners, *cells, CELL_TOLERANCE * size, wrenches)
+
+        force, moment = self._pulls(wrenches)
+        at = self._robot.ends_and_jacobians(q, base[0], frames=self._names)
+        own = np.concatenate([(force[:, None] @ at.rotations)[:, 0], (moment[:, None] @ at.rotations)[:, 0]], axis=1)
+        gradient = np.zeros(len(x))
+        rows = np.repeat(np.arange(len(self._frames)), np.diff(at.offsets))
+        np.add.at(gradient, at.joints, np.einsum("kc,kc->k", at.twists, own[rows]))
+        for segment, column, joint, scale in self._bends:
+            gradient[joint] += scale * wrenches[segment, column]
+
+        arms = at.positions - base[0, :3]
+        about = np.cross(arms, force).sum(axis=0) + moment.sum(axis=0) + self._base_moment(wrenches)
+        gradient[self.n :] = (self._kink_axes(kink, hinged) @ about)[self._axes]
+        return total / size, gradient / size
+
+    def metric(self, x: Array) -> Array:
+        """(n + k, n + k): mean square, over the body, of how far its points move with the unknowns, in body lengths.
+        Divided by the distance it is about the Hessian: what an optimiser should be told."""
+        q, kink = np.ascontiguousarray(x[: self.n]), self.full_kink(x)
+        hinged = self._made.kind == "straight"
+        base = compose(self._tail, np.concatenate([np.zeros(3), kink_quaternion(kink, hinged)])[None])[0]
+        segments = self._made.segments
+        at = self._robot.ends_and_jacobians(q, base, frames=tuple(self._robot.frames[s.first + 1] for s in segments))
+        moves = at.stacked().reshape(len(segments), 6, -1)[:, :3]
+        turns = self._kink_axes(kink, hinged)[self._axes]
+        arms = at.positions - base[:3]
+        kinks = np.cross(turns[None], arms[:, None]).swapaxes(1, 2)
+        J = np.concatenate([at.rotations @ moves, kinks], axis=2)
+        weights = np.array([s.end - s.start for s in segments]) / self._made.length**3
+        return np.asarray(np.einsum("s,sia,sib->ab", weights, J, J, optimize=True))
+
+    def _pulls(self, wrenches: Array) -> tuple[Array, Array]:
+        """Forces and moments (F, 3) on the frames."""
+        force, moment = np.zeros((len(self._frames) + 1, 3)), np.zeros((len(self._frames) + 1, 3))
+        # the base, which is not among the frames, is last
+        first = np.where(self._first > 0, np.searchsorted(self._frames, self._first), -1)
+        np.add.at(force, first, wrenches[:, :3])
+        np.add.at(moment, first[self._arc], wrenches[self._arc, 3:6])
+        line = ~self._arc
+        np.add.at(force, np.searchsorted(self._frames, self._first[line] + 1), wrenches[line, 3:6])
+        return force[:-1], moment[:-1]
+
+    def _base_moment(self, wrenches: Array) -> Array:
+        """(3,): what an arc that begins at the base turns it by."""
+        return np.asarray(wrenches[self._arc & (self._first == 0), 3:6].sum(axis=0))
+
+    def _kink_axes(self, kink: Array, hinged: bool) -> Array:
+        """(2, 3): the axes about which the base turns with the kink's pitch and yaw."""
+        frame = matrix_from_quaternion(self._tail[0, 3:])
+        if not hinged:
+            return np.asarray((frame @ left_jacobian(np.array([0.0, *kink])))[:, 1:].T)
+        yaw = matrix_from_quaternion(kink_quaternion(np.array([0.0, kink[1]]), True))
+        return np.stack([frame @ yaw[:, 1], frame[:, 2]])
