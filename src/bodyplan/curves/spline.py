@@ -180,7 +180,8 @@ def _carried(first: Array, last: Array, roll: Array) -> Array:
     frames are put at the starts, and the angles between what arrives and what was put there are summed.
     """
     helper = np.eye(3)[np.argmin(np.abs(first), axis=1)]
-    helper[0] = (0.0, 0.0, 1.0) if abs(first[0, 2]) < 1.0 - 1e-9 else (-1.0, 0.0, 0.0)
+    # straight up or down: as a level curve would arrive there that pitches by a quarter turn
+    helper[0] = (0.0, 0.0, 1.0) if abs(first[0, 2]) < 1.0 - 1e-9 else (-np.sign(first[0, 2]), 0.0, 0.0)
     # e_y as near to the helper as can be
     e_p = np.cross(helper, first)
     e_p /= np.linalg.norm(e_p, axis=1, keepdims=True)
