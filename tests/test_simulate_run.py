@@ -18,7 +18,7 @@ from bodyplan.robot.library import snake
 from bodyplan.robot.model import Robot
 from bodyplan.simulate import Friction, Trial, simulate
 from bodyplan.simulate.loop import Timing
-from bodyplan.simulate.measure import Records, progress_of, slips_of
+from bodyplan.simulate.measure import Records, progress_of, slips_of, turned_of
 from bodyplan.simulate.reference import Reference, region
 from bodyplan.spatial.rotations import multiply, quaternion_exp
 
@@ -101,6 +101,62 @@ def test_scales_slide_forward_hold_backward_and_slip_sideways(heading: float, mu
     else:
         # a capsule across the slope may roll, which no friction resists: it is no slower than sliding
         assert moved > 0.98 * 0.5 * G * (np.sin(angle) - mu * np.cos(angle)) * 0.64
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, -1.1, 2.9])
+def test_the_slip_angle_is_that_between_axis_and_velocity(heading: float) -> None:
+    angle = 0.3
+    plane, pose = downhill(angle, heading)
+    # two capsules side by side cannot roll
+    pair = [
+        Contact(f"runner{i}", "base", "capsule", 0.01, start=(-0.1, y, 0.0), end=(0.1, y, 0.0))
+        for i, y in enumerate((-0.05, 0.05))
+    ]
+    sled = Robot.from_rows({"mark": [Row(a=0.1)]}, base_body=Body(mass=0.7, com=(0.0, 0.0, 0.0)), contacts=pair)
+    trial = simulate(still(sled, plane, 0.8, pose), friction=0.1, settle=0.0, ramp=0.0)
+    # both seen from above: downhill (cos angle, 0), the axis (cos heading cos angle, sin heading)
+    want = np.arctan2(abs(np.sin(heading)), abs(np.cos(heading) * np.cos(angle)))
+    assert trial.slip_angle == pytest.approx(want, abs=2e-3)
+    assert trial.metrics()["slip_angle_rad"] == trial.slip_angle
+    assert trial.turned is not None and abs(trial.turned[0]) < 1e-3
+    assert trial.forward_ratio is None  # no advance is planned
+
+
+def test_shapes_without_an_axis_have_no_slip_angle() -> None:
+    plane, pose = downhill(0.3, 0.0)
+    trial = simulate(still(block(), plane, 0.2, pose), friction=0.1, settle=0.0, ramp=0.0)
+    assert trial.slip_angle is None and trial.metrics()["slip_angle_rad"] is None
+
+
+def test_lifted_capsules_do_not_count_for_the_slip_angle() -> None:
+    runner = Contact("runner", "base", "capsule", 0.01, start=(-0.1, 0.0, 0.0), end=(0.1, 0.0, 0.0))
+    wide = [Contact(f"side{i}", "base", "sphere", 0.01, start=(0.0, y, 0.0)) for i, y in enumerate((-0.05, 0.05))]
+    mast = Contact("mast", "base", "capsule", 0.01, start=(0.0, -0.03, 0.05), end=(0.0, 0.03, 0.05))
+    plane, pose = downhill(0.3, 0.0)
+    sled = Robot.from_rows({"mark": [Row(a=0.1)]}, base_body=Body(mass=0.7), contacts=[runner, *wide, mast])
+    trial = simulate(still(sled, plane, 0.5, pose), friction=0.1, settle=0.0, ramp=0.0)
+    assert trial.slip_angle == pytest.approx(0.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, -2.5])
+def test_a_base_that_is_turned_from_the_plan(turn: float) -> None:
+    t = np.linspace(0.0, 2.0, 41)
+    base = np.tile([0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0], (41, 1))
+    base[:, 0] = 0.1 * t
+    base[:, 3:] = [
+        multiply(quaternion_exp([0.0, 0.0, 0.3 * np.sin(np.pi * x)]), quaternion_exp([0.5, 0.0, 0.0])) for x in t
+    ]
+    robot = block()
+    plan = motion_of(robot, Plane(), np.zeros((41, 0)), t, base, [Claim("periodic", "p", {"period": 2.0})])
+    reference = Reference.of(plan)
+    times_ = np.linspace(1.0, 5.0, 201)
+    executed = np.array([reference.base(x - 1.0) for x in times_])
+    executed[:, 3:] = multiply(quaternion_exp([0.0, 0.0, turn]), executed[:, 3:])
+    executed[::2, 3:] *= -1.0  # the same rotations
+    none = np.zeros((201, 0))
+    records = Records(times_, executed, none, none, executed[:, :3])
+    got = turned_of(records, reference, lambda x: x - 1.0, 1.0, 2.0, 2)
+    assert np.abs(got - turn).max() < 1e-12
 
 
 def lift(height: float = 0.1, **joint: Any) -> Motion:
