@@ -1,6 +1,7 @@
 """From a body curve to joint angles."""
 
 from bodyplan.fitting.angles import JointAngles
+from bodyplan.fitting.convergence import Convergence, ConvergenceRow, convergence
 from bodyplan.fitting.fits import Fit, Turning, fit
 from bodyplan.fitting.links import ExactLength, LinksFit, exact_link_length, links_on_curve
 from bodyplan.fitting.mechanism import Mechanism, mechanism
@@ -9,6 +10,8 @@ from bodyplan.fitting.rules import GAUSS_P, Bends, Rule, rule
 __all__ = [
     "GAUSS_P",
     "Bends",
+    "Convergence",
+    "ConvergenceRow",
     "ExactLength",
     "Fit",
     "JointAngles",
@@ -16,6 +19,7 @@ __all__ = [
     "Mechanism",
     "Rule",
     "Turning",
+    "convergence",
     "exact_link_length",
     "fit",
     "links_on_curve",
