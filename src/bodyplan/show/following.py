@@ -104,11 +104,11 @@ def in_words(found: Following) -> str:
     worst = int(np.argmax(found.distance))
     small, large = float(found.error.min()), float(found.error.max())
     between = f"between {figure(small)} and {figure(large)}" if large > 1.001 * small else f"{figure(large)} throughout"
+    when, far = ("cycle" if found.cyclic else "motion"), float(found.distance[worst])
     return (
-        f"Over the {'cycle' if found.cyclic else 'motion'} the mean distance between mechanism and curve, as a share of "
-        f"the body’s length (E_nm), is <b>{between}</b>. The largest distance is <b>{figure(float(found.distance[worst]), 'm')}</b> "
-        f"({percent(float(found.distance[worst]) / found.length)} of the body), at "
-        f"{figure(float(found.t[worst]), 's', 3)}."
+        f"Over the {when} the mean distance between mechanism and curve, as a share of the body’s length (E_nm), is "
+        f"<b>{between}</b>. The largest distance is <b>{figure(far, 'm')}</b> ({percent(far / found.length)} of the "
+        f"body), at {figure(float(found.t[worst]), 's', 3)}."
     )
 
 

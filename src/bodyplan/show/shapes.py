@@ -28,16 +28,16 @@ MOST_SIDE = 56
 
 
 def bones(robot: Robot) -> list[tuple[int, int]]:
-    """Pairs of frames (before, after) to join by a line: those whose later frame carries no capsule, which
-    would hide it."""
+    """Pairs of frames (before, after) to join by a line: arcs, and those whose later frame carries no capsule, which
+    would hide a straight line."""
     capsules = {contact.frame for contact in robot.contacts if contact.shape == "capsule"}
     out = []
     for chain in robot.chains:
         before = robot.frame_index(chain.parent)
-        for i in range(len(chain.elements)):
+        for i, element in enumerate(chain.elements):
             name = chain.frame_name(i)
             after = robot.frame_index(name)
-            if name not in capsules:
+            if isinstance(element, Arc) or name not in capsules:
                 out.append((before, after))
             before = after
     return out
@@ -45,8 +45,8 @@ def bones(robot: Robot) -> list[tuple[int, int]]:
 
 def arc_bones(robot: Robot) -> dict[tuple[int, int], tuple[float, float]]:
     """Of the :func:`bones` those that are arcs of constant curvature: length and radius m; the radius is that of the
-    sphere on the frame, or of the base, 0 where there is none."""
-    thick = {contact.frame: contact.radius for contact in robot.contacts if contact.shape == "sphere"}
+    round shape on the frame, 0 where there is none."""
+    thick = {contact.frame: contact.radius for contact in robot.contacts if contact.shape in ("capsule", "sphere")}
     joined = set(bones(robot))
     out = {}
     for chain in robot.chains:
