@@ -57,8 +57,10 @@ def snake(
     volume of its capsule at 1000 kg/m^3), spread evenly along it. ``limits`` (low, high) rad, ``rate`` rad/s and
     ``effort`` N m for every joint. ``friction``: Coulomb coefficient of the belly.
 
-    Contacts, named like their frame: a straight link is a capsule over its whole length. An arc is a sphere at its
-    front end: that point is on the body's centre line at every bend. Of double joints every rigid part is a capsule
+    Contacts, named like their frame: a straight link is a capsule over its whole length. Arcs touch where they meet,
+    on the centre line at every bend: a capsule reaches from there an eighth of a unit each way along the tangent
+    ("tail" on the base, "link1", ...); half of a unit's mass is at each of its ends. Of double joints every rigid
+    part is a capsule
     over its whole length: "tail" (the first end link, on the base), "middle1" (the middle link of unit 1, whose
     frame is at its front end and may lie on its side), "link1" (the front end link of unit 1 and the rear one of
     unit 2, one part), ..., "linkN" (the last end link).

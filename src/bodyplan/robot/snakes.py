@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,7 +46,7 @@ class Units:
 
     def capsule(self, name: str, frame: str, behind: float, ahead: float = 0.0) -> Contact:
         """A capsule along x of a frame, from ``behind`` m behind its origin to ``ahead`` m before it."""
-        start, end = (-behind, 0.0, 0.0), (ahead, 0.0, 0.0)
+        start, end = (0.0 - behind, 0.0, 0.0), (ahead, 0.0, 0.0)
         return Contact(name, frame, "capsule", self.radius, start=start, end=end, friction=self.friction)
 
 
@@ -66,13 +67,32 @@ def straight(units: Units) -> Parts:
 
 
 def arcs(units: Units) -> Parts:
-    """Every unit bends with constant curvature."""
+    """Every unit bends with constant curvature.
+
+    Contacts and masses sit on the frames between the units: half of a unit's mass at each of its ends. A capsule
+    reaches an eighth of a unit along the tangent, by which it leaves an arc of 1 rad by less than 1 % of its length.
+    """
+    sizes = [(0.0, 0.0), *_sizes(units), (0.0, 0.0)]
     parts = Parts([], [])
-    for i, (length, mass) in enumerate(_sizes(units), start=1):
-        frame, body = f"link{i}", Body(mass=mass, com=(-0.5 * length, 0.0, 0.0))
-        parts.elements.append(Arc(length, **units.bends(i), name=frame, body=body))
-        parts.contacts.append(Contact(frame, frame, "sphere", units.radius, friction=units.friction))
-    return parts
+    bodies = []
+    for i, ((rear, rear_mass), (front, front_mass)) in enumerate(pairwise(sizes)):
+        name, frame = ("tail", "base") if i == 0 else (f"link{i}", f"link{i}")
+        parts.contacts.append(units.capsule(name, frame, 0.125 * rear, 0.125 * front))
+        bodies.append(_halves(rear, rear_mass, front, front_mass, units.radius))
+        if i:
+            parts.elements.append(Arc(rear, **units.bends(i), name=frame, body=bodies[i]))
+    return parts._replace(base_body=bodies[0])
+
+
+def _halves(rear: float, rear_mass: float, front: float, front_mass: float, radius: float) -> Body:
+    """Half of the unit behind a frame and half of the one before it, as cylinders."""
+    masses, sizes = 0.5 * np.array([rear_mass, front_mass]), 0.5 * np.array([rear, front])
+    middles = 0.5 * sizes * [-1.0, 1.0]
+    total = float(masses.sum())
+    com = float(masses @ middles) / total
+    spread = masses @ (sizes**2 / 12.0 + (middles - com) ** 2)
+    across = float(0.25 * total * radius**2 + spread)
+    return Body(mass=total, com=(com, 0.0, 0.0), inertia=(0.5 * total * radius**2, across, across, 0.0, 0.0, 0.0))
 
 
 def doubles(units: Units, end_link: float, tips: float = 0.0) -> Parts:
