@@ -61,7 +61,8 @@ class Serpentine(Gait):
     moves evenly, a periodic curve only). The joints are the same. The curve is laid level with its displacement over a
     period along +x (see :func:`bodyplan.gaits.placing.place`), the tail end starts at the world's origin, and the
     lowest contact of the whole motion touches the floor. ``p``: parameter of eqs. (11)-(16), default the Gauss node.
-    ``touch`` m: contacts within this height of the floor count as touching; default a fifth of the lift.
+    ``touch`` m: contacts that come down to within this height count as touching (see
+    :func:`bodyplan.gaits.touching.touching`); default a fifth of the lift.
 
     Joint angles, rates and accelerations are exact in time, by the rule of :func:`bodyplan.fitting.rule`. Raises
     InputError for values out of range.
@@ -188,7 +189,7 @@ class Serpentine(Gait):
         rise, heights = rest_on_floor(robot, ground, joints.q, base, type(self).__name__)
         placing = body.placing.raised(rise)
         base[:, 2] += rise
-        contacts, lift, within = touching(heights, self.touch)
+        contacts, lift, within = touching(heights, self.touch, self._covers(robot, t))
         facts = body.facts(placing, sigma, t)
         facts["lift"] = lift
         if contacts is not None:
@@ -209,6 +210,11 @@ class Serpentine(Gait):
             facts=facts,
             notes=tuple(self._notes(body, placing, within if contacts is not None else None)),
         )
+
+    def _covers(self, robot: Robot, t: Array) -> bool:
+        """True where the samples cover a cycle."""
+        period = self.period(robot)
+        return period is not None and float(t[-1] - t[0]) >= 0.95 * period
 
     def _claims(
         self,
@@ -256,7 +262,7 @@ class Serpentine(Gait):
         if placing.period is not None and climb > 1e-6 * placing.period:
             notes.append(f"The curve leaves the level by {climb * 1e3:.3g} mm a period.")
         if within is not None:
-            notes.append(f"Contacts within {within * 1e3:.3g} mm of the floor count as touching.")
+            notes.append(f"Contacts up to {within * 1e3:.3g} mm above the floor count as touching.")
         if self.base == "chassis":
             notes.append("Virtual chassis: the mean body frame moves evenly; the frames are not free of slip.")
         return notes

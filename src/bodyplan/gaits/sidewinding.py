@@ -47,8 +47,9 @@ class Sidewinding(Gait):
     the same: their planes of bending are turned, place by place, from the middle of the body on.
 
     ``start`` m: place of the tail end on the wave at t = 0. ``p``: parameter of eqs. (11)-(16) of paper *acm*.
-    ``touch`` m: contacts within this height of the floor count as touching (default: a tenth of the lift). Raises
-    InputError for values out of range, or amplitudes with which the wave is not level or nothing moves.
+    ``touch`` m: contacts that come down to within this height count as touching (default: a tenth of the lift; see
+    :func:`bodyplan.gaits.touching.touching`). Raises InputError for values out of range, or amplitudes with which the
+    wave is not level or nothing moves.
     """
 
     kind: ClassVar[str] = "sidewinding"
@@ -140,7 +141,8 @@ class Sidewinding(Gait):
         base[:, 2] += rise
         path[:, 2] += rise
         lift = float(heights.max(initial=0.0))
-        contacts, _, within = touching(heights, TOUCH * lift if self.touch is None else self.touch)
+        covers = float(t[-1] - t[0]) >= 0.95 * self.period(robot)
+        contacts, _, within = touching(heights, TOUCH * lift if self.touch is None else self.touch, covers)
         # the torsion does not move the points of the curve
         claims = [following.follows(path, sigma[:, None] + following.stations)]
         data = {"period": self.period(robot), "advance": level.advance, "turn": 0.0, "tolerance": CLOSED}
@@ -151,7 +153,7 @@ class Sidewinding(Gait):
         notes = rule_notes(following)
         notes.append("The world's x axis is the direction of travel; the body lies at direction_angle to it.")
         notes.append(f"A torsion of {level.torsion:.4g} rad/m keeps the wave level; planes of bending are turned by it.")
-        notes.append(f"Contacts within {within * 1e3:.3g} mm of the floor count as touching.")
+        notes.append(f"Contacts up to {within * 1e3:.3g} mm above the floor count as touching.")
         return Motion(
             robot=robot,
             ground=ground,

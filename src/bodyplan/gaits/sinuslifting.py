@@ -14,8 +14,7 @@ class SinusLifting(Serpentine):
 
     ``alpha`` rad, ``lift`` (c0; 0 is plain serpentine movement, > 0 lifts the bends), ``wavelength`` m and ``c1`` (None:
     the value that keeps the curve level; "paper": eq. (37); or a number) are those of the curve; all others those of
-    :class:`Serpentine`. ``motion.contacts`` says which contacts touch: those whose lowest point lies within ``touch`` m
-    of the floor (default a fifth of the lift), which are the ones where the curve bends least.
+    :class:`Serpentine`. ``motion.contacts`` says which contacts touch, which are the ones where the curve bends least.
 
     Raises InputError for values out of range, or where no c1 keeps the curve level.
     """

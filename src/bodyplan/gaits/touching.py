@@ -33,16 +33,19 @@ def lowest_points(robot: Robot, q: Array, base: Array) -> Array:
     return out
 
 
-def touching(heights: Array, within: float | None) -> tuple[BoolArray | None, float, float]:
-    """Which contacts touch (T, c), the lift (m), and the height (m) within which they do.
+def touching(heights: Array, within: float | None, whole: bool) -> tuple[BoolArray | None, float, float]:
+    """Which contacts touch (T, c), the lift (m), and the height (m) up to which they do.
 
     ``heights`` (T, c) of the contacts' lowest points above the floor; ``within`` m, None for :data:`TOUCH` of the
-    lift. None instead of a schedule where everything touches all the time.
+    lift. A planned body is rigid and its ends may reach lower than all else, so with ``whole`` (the samples cover a
+    cycle) the height counts from where most contacts come down to: the median of their lowest. None instead of a
+    schedule where everything touches all the time.
     """
     lift = float(heights.max(initial=0.0))
     if lift <= FLAT:
         return None, lift, FLAT
-    limit = TOUCH * lift if within is None else within
+    level = float(np.median(heights.min(axis=0))) if whole else 0.0
+    limit = level + (TOUCH * lift if within is None else within)
     return heights <= limit, lift, limit
 
 
