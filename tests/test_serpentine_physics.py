@@ -85,3 +85,36 @@ def test_lifting_the_parts_between_the_bends_reverses_the_travel():
 
 def test_a_belly_that_slides_easier_sideways_reverses_the_travel():
     assert trial(flat(), 0.5).advance_ratio < -0.4
+
+
+# --- snakes of other joints ---
+
+
+def run_cycle(robot, gait, **settings):
+    period = gait.period(robot)
+    motion = bp.plan(robot, gait, bp.Plane(), np.linspace(0.0, period, 201))
+    return bp.simulate(motion, cycles=1, **settings)
+
+
+@pytest.fixture(scope="module")
+def modules():
+    """Sixteen modules whose joints turn about z and y in turn."""
+    return bp.snake(16, 0.06, axes="alternating", radius=0.02, mass=0.08)
+
+
+def test_arcs_travel_on_scales():
+    robot = bp.snake(9, 0.8 / 9, "arc", radius=0.025, mass=0.11)
+    run = run_cycle(robot, flat(), friction=bp.Friction(0.2, 0.2, 0.4), servo=(8.0, 0.06))
+    assert 0.4 < run.advance_ratio < 0.7 and not any("out of step" in text for text in run.warnings)
+
+
+def test_sidewinding_needs_no_scales(modules):
+    gait = bp.Sidewinding(0.6, 0.2, 0.64, speed=0.16)
+    run = run_cycle(modules, gait, friction=0.5, servo=(10.0, 0.2))
+    assert run.advance_ratio >= 0.75 and abs(run.sideways[0]) < 0.2 * np.linalg.norm(run.planned_advance[0])
+    assert run.slip_angle > np.radians(30.0)  # it moves across its own axis, that is the point of it
+
+
+def test_a_bent_body_rolls_sideways_by_its_girth(modules):
+    run = run_cycle(modules, bp.Rolling(1.0, np.pi / 2.0), friction=0.5, servo=(10.0, 0.2))
+    assert run.advance[0] == pytest.approx([0.0, 2.0 * np.pi * 0.02, 0.0], abs=0.01)

@@ -294,3 +294,37 @@ def test_acm_l2_in_a_mission():
     build, units = ROBOTS["acm_l2"]
     assert build is bp.acm_l2 and units["limits"] == "angle"
     assert {"joints", "limits", "effort"} <= set(json_schema()["kinds"]["robot"]["acm_l2"]["properties"])
+
+
+# --- arcs ---
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_arcs_touch_where_they_meet_and_are_as_heavy_as_they_should(axes):
+    lengths = np.array([0.1, 0.2, 0.15])
+    robot = bp.snake(3, lengths, "arc", axes=axes, mass=0.3, radius=0.02)
+    assert [c.name for c in robot.contacts] == ["tail", "link1", "link2", "link3"]
+    assert [c.frame for c in robot.contacts] == ["base", "link1", "link2", "link3"]
+    reach = np.array([[0.0, 0.1], [-0.1, 0.2], [-0.2, 0.15], [-0.15, 0.0]]) / 8.0
+    for contact, ends in zip(robot.contacts, reach, strict=True):
+        assert np.abs(contact.points() - np.outer(ends, X)).max() < 1e-16 and contact.shape == "capsule"
+    assert robot.mass == pytest.approx(0.9, rel=1e-14)
+    # the mass and the moments of three rods, wherever they are cut
+    rest = robot.forward(np.zeros(robot.n)).positions[:, 0]
+    bodies = [robot.base_body, *(element.body for element in robot.elements)]
+    places = [x + b.com[0] for x, b in zip(rest, bodies, strict=True)]
+    assert sum(b.mass * x for b, x in zip(bodies, places, strict=True)) == pytest.approx(
+        0.3 * np.sum(np.cumsum(lengths) - lengths / 2.0), rel=1e-13
+    )
+    about_tail = sum(b.inertia[1] + b.mass * x**2 for b, x in zip(bodies, places, strict=True))
+    front = np.cumsum(lengths)
+    rods = 0.3 / lengths * (front**3 - (front - lengths) ** 3) / 3.0
+    assert about_tail == pytest.approx(rods.sum() + 0.9 * 0.02**2 / 4.0, rel=1e-12)
+    assert sum(b.inertia[0] for b in bodies) == pytest.approx(0.9 * 0.02**2 / 2.0, rel=1e-12)
+
+
+def test_the_contact_of_an_arc_leaves_it_by_less_than_one_per_cent():
+    bend = 1.0
+    # the arc an eighth of its length before its end, seen from the end
+    x, y = np.sin(bend / 8.0) / bend, (1.0 - np.cos(bend / 8.0)) / bend
+    assert np.hypot(x - 0.125, y) < 0.01
