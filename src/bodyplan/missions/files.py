@@ -265,10 +265,10 @@ def _line_of(text: str, place: Sequence[str | int]) -> int | None:
         table = re.match(r"\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(#.*)?$", line)
         if table:
             current = table.group(2).replace(" ", "")
-            if table.group(1) == "[[" and current == header:
+            if table.group(1) == "[[" and current in (header, ".".join(names)):
                 seen += 1
-                current = header if seen == which else ""
-            if current == ".".join(names) and table.group(1) == "[":
+                current = current if seen == which else ""
+            if current and current == ".".join(names):
                 return i
             if current == header:
                 best = i

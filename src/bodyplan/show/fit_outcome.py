@@ -154,6 +154,14 @@ class FitOutcome:
         }
 
 
+#: what the tables mean by straight links: two robots, each the one that its readers know
+STRAIGHT = (
+    "Straight links among the mechanisms of one number of joints are those of bp.snake: links that turn about one axis, "
+    "or twice as many with joints in turns, yaw at the first. Over the number of joints they are the paper's: twice as "
+    "many links with joints in turns, where the virtual joint at the tail yaws."
+)
+
+
 def axes_of(curve: BodyCurve) -> str:
     """ "yaw" or "pitch" for a curve that bends about that axis alone, else "universal"."""
     s = np.unique(np.concatenate([np.linspace(0.0, curve.length, 1001), curve.breaks]))

@@ -13,7 +13,7 @@ from bodyplan.files import replacing
 from bodyplan.show import fitted_plots
 from bodyplan.show.document import document
 from bodyplan.show.figures import STYLE, new_figure
-from bodyplan.show.fit_outcome import FitOutcome, saturated
+from bodyplan.show.fit_outcome import STRAIGHT, FitOutcome, saturated
 from bodyplan.show.fitted_figures import draw_angles, draw_distance, draw_overlay, draw_turning
 from bodyplan.show.layout import layout, line
 from bodyplan.show.series import SERIES
@@ -168,7 +168,7 @@ def _orders(convergence: Any) -> str:
     ]  # fmt: skip
     about = (
         "<p>The order is how fast the error falls: at order 2, twice the joints leave a quarter of it. Straight links "
-        "and double joints are of order 2, arcs of order 3 with p at the Gauss node.</p>"
+        f"and double joints are of order 2, arcs of order 3 with p at the Gauss node.</p><p>{esc(STRAIGHT)}</p>"
     )
     head = ("mechanism", "rule", "joints", "E_nm", "its quadrature error", "order")
     return about + table(head, rows, numbers=range(2, 6))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bodyplan.show.fit_outcome import FitOutcome, saturated
+from bodyplan.show.fit_outcome import STRAIGHT, FitOutcome, saturated
 
 
 def fit_text(outcome: FitOutcome) -> str:
@@ -47,7 +47,7 @@ def fit_text(outcome: FitOutcome) -> str:
             f"  limits     {_limits(outcome)}",
             "",
             *_columns(head, mechanisms, 2),
-            *(["", str(outcome.convergence)] if outcome.convergence is not None else []),
+            *(["", str(outcome.convergence), "", STRAIGHT] if outcome.convergence is not None else []),
         ]
     )
 

@@ -1,0 +1,274 @@
+"""A mission at several values of a field, and its figures beside a paper's: what is run, said, written and refused."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import bodyplan as bp
+from bodyplan import job
+from bodyplan.metrics import Metrics, metrics_of
+from bodyplan.missions import load_mission, parse_mission
+from bodyplan.missions.files import alone
+from bodyplan.show.beside import Beside, beside, metrics_in, scale_of
+from bodyplan.show.grids import grid_plot, grid_section, in_words
+from bodyplan.show.outcome import Grid, GridPoint
+
+MISSION = """title = "t"
+[robot]
+kind = "snake"
+links = 8
+link_length = "100 mm"
+[gait]
+kind = "concertina"
+body_modules = 2
+gamma_max = 0.8
+contraction = "mirror"
+max_joint_rate = 3.0
+[ground]
+kind = "corridor"
+width = 0.16
+friction = 0.05
+[time]
+cycles = 1
+dt = "50 ms"
+[simulate]
+cycles = 1
+settle = 0.2
+dt = "2 ms"
+"""
+GRID = """[grid]
+key = "simulate.friction"
+values = [0.05, 0.3]
+label = "friction"
+"""
+PAPER = """[[paper]]
+what = "speed"
+printed = 55
+unit = "mm/s"
+ours = "trial.speed_m_s"
+source = "page 7"
+[[paper]]
+what = "gain"
+printed = 1.36
+ours = "trial.speed_m_s / plan.speed"
+"""
+
+
+def parse(text, *overrides):
+    return parse_mission(text, "m", "m.toml", None, overrides)
+
+
+@pytest.fixture(scope="module")
+def worked():
+    """The small mission with its grid and its table, and what was said of the progress."""
+    pytest.importorskip("mujoco")
+    said = []
+    outcome = job.work(parse(MISSION + GRID + PAPER), progress=lambda step, part: said.append((step, part)))
+    return outcome, said
+
+
+# --- the grid
+
+
+def test_every_point_is_what_the_mission_gives_alone(worked):
+    outcome, said = worked
+    assert [(p.mission, p.value, p.status) for p in outcome.grid.points] == [("m", 0.05, "ok"), ("m", 0.3, "ok")]
+    for point in outcome.grid.points:
+        mission = parse(MISSION, f"simulate.friction={point.value}")
+        motion = job.plan_mission(mission)
+        trial = job.simulate_mission(mission, motion)
+        assert point.advance_ratio == trial.advance_ratio and point.speed == trial.speed
+        assert point.peak_torque == trial.peak_torque and point.cost_of_transport == trial.cost_of_transport
+    assert outcome.grid.points[0].advance_ratio != outcome.grid.points[1].advance_ratio
+    assert [part for step, part in said if step == "grid"] == [0.0, 0.5]
+
+
+def test_metrics_and_page_have_the_grid(worked):
+    outcome, _ = worked
+    metrics = json.loads(json.dumps(metrics_of(outcome).model_dump(), allow_nan=False))
+    assert metrics["grid"]["key"] == "simulate.friction" and metrics["grid"]["values"] == [0.05, 0.3]
+    assert metrics["grid"]["points"][1]["speed"] == outcome.grid.points[1].speed
+    Metrics.model_validate(metrics)
+    text = grid_section(outcome.grid, "m").replace("\u00a0", " ")
+    for point in outcome.grid.points:
+        assert f"{100 * point.advance_ratio:#.3g} %" in text and f"{point.peak_torque:.3g} N m" in text
+    assert "Over friction" in text
+    (line,) = grid_plot(outcome.grid)["data"]
+    np.testing.assert_allclose(line["x"], [0.05, 0.3])
+    np.testing.assert_allclose(line["y"], [p.advance_ratio for p in outcome.grid.points], rtol=1e-4)
+
+
+def test_no_compare_skips_the_grid():
+    outcome = job.work(parse(MISSION + GRID), simulate=False)
+    assert outcome.grid is None and grid_section(outcome.grid, "m") == ""
+    pytest.importorskip("mujoco")
+    assert job.work(parse(MISSION + GRID), compare=False).grid is None
+
+
+def test_a_point_that_fails_is_a_row_with_its_reason():
+    pytest.importorskip("mujoco")
+    # half waves much shorter than a link: nothing can follow, but nothing is raised
+    tight = job.grid_point(MISSION, "m", "gait.omega", 40.0)
+    assert tight.status != "ok" and tight.reason and tight.advance_ratio is None
+    refused = job.grid_point(MISSION, "m", "gait.gamma_max", 5.0)
+    assert refused.status == "refused" and "gamma_max" in refused.reason
+    grid = Grid("gait.omega", "omega", (1.2, 40.0), ("m",), (GridPoint("m", 1.2, "ok", "", 0.5), tight))
+    assert "1 of 2 runs have no figures" in " ".join(in_words(grid, "m"))
+    text = grid_section(grid, "m")
+    assert tight.status in text and not re.search(r"\b(nan|None)\b", text)
+
+
+def test_other_missions_run_beside_this_one():
+    text = MISSION + GRID + 'missions = ["concertina-scales"]\n'
+    scaly = MISSION + "friction = { forward = 0.1, backward = 0.1, sideways = 0.3 }\n"
+    sideways = GRID.replace('"simulate.friction"', '"simulate.friction.sideways"')
+    assert parse(scaly + sideways).grid.key == "simulate.friction.sideways"
+    with pytest.raises(bp.InputError, match=r"mission concertina.*simulate\.friction"):
+        # the skin of the other mission is not scaly
+        parse(scaly + sideways + 'missions = ["concertina"]\n')
+    cells = job._cells(parse(text))
+    assert [(name, value) for _, name, _, value in cells] == [
+        ("m", 0.05),
+        ("m", 0.3),
+        ("concertina-scales", 0.05),
+        ("concertina-scales", 0.3),
+    ]
+
+
+def test_words_say_where_it_is_ahead_and_where_not():
+    def row(mission, *ratios):
+        return [GridPoint(mission, v, "ok", "", r) for v, r in zip((0.2, 0.3, 0.4), ratios, strict=True)]
+
+    points = (*row("lifted", 0.7, 0.8, 0.82), *row("flat", -0.05, 0.799, 0.92))
+    grid = Grid("k", "friction sideways", (0.2, 0.3, 0.4), ("lifted", "flat"), points)
+    (said,) = in_words(grid, "lifted")
+    assert "beside flat and by friction sideways" in said
+    assert "more at 0.2 (by 75 points); as much at 0.3; less at 0.4 (by 10 points)" in said
+    (alone_said,) = in_words(Grid("k", "mu", (0.2, 0.3, 0.4), ("flat",), tuple(row("flat", -0.05, 0.8, 0.9))), "flat")
+    assert "the most of its planned advance, 90.0\u00a0%, at mu = 0.4" in alone_said and "at 0.2" in alone_said
+
+
+def test_a_mission_alone_has_no_comparisons():
+    mission = alone(MISSION + GRID + PAPER, "m", ("gait.omega=1.5",))
+    assert mission.grid is None and mission.paper == () and mission.compare == ()
+    assert mission.gait.omega == 1.5 and mission.robot == bp.snake(8, 0.1)
+
+
+@pytest.mark.parametrize(
+    "old,new,words",
+    [
+        ("simulate.friction", "simulate.frction", ["frction", "friction", "servo"]),
+        ("simulate.friction", "gait.omga", ["omga", "omega"]),
+        ("simulate.friction", "title", ["title", "nothing to vary"]),
+        ("0.3]", "-0.3]", ["-0.3", "greater than or equal to 0"]),
+        ("0.3]", "nan]", ["finite"]),
+        ("[0.05, 0.3]", "[]", ["grid.values", "at least 1"]),
+        ("[0.05, 0.3]", str([0.01 * i for i in range(21)]), ["grid.values", "20"]),
+        ('label = "friction"', 'missions = ["concertino"]', ["concertino", "concertina-paper"]),
+        ('label = "friction"', 'missions = ["a", "b", "c", "d", "e"]', ["grid.missions", "4"]),
+        ('label = "friction"', 'labl = "friction"', ["labl", "label", "missions", "values"]),
+    ],
+)
+def test_wrong_grids_are_named_with_their_line(old, new, words):
+    text = MISSION + GRID.replace(old, new)
+    first = text.splitlines().index("[grid]") + 1
+    with pytest.raises(bp.InputError) as caught:
+        parse(text)
+    line = re.search(r"m\.toml, line (\d+)", str(caught.value))
+    assert line and int(line[1]) >= first
+    assert [w for w in words if w not in str(caught.value)] == []
+
+
+def test_the_mission_of_a_run_keeps_its_grid_and_table():
+    mission = parse(MISSION + GRID + PAPER, "gait.omega=1.5")
+    again = parse(mission.text)
+    assert (again.grid, again.paper, again.gait) == (mission.grid, mission.paper, mission.gait)
+    assert load_mission("concertina").grid is None
+
+
+# --- beside the paper
+
+
+def test_our_figures_stand_beside_the_papers(worked):
+    outcome, _ = worked
+    speed, planned = outcome.trial.speed, outcome.motion.facts["speed"]
+    one, two = outcome.paper
+    assert (one.what, one.printed, one.unit, one.source) == ("speed", 55.0, "mm/s", "page 7")
+    assert one.value == pytest.approx(1e3 * speed, rel=1e-12)
+    assert two.value == pytest.approx(speed / planned, rel=1e-12)
+    assert metrics_of(outcome).paper == [one, two]
+
+
+def test_ratios_units_and_other_missions():
+    from types import SimpleNamespace as Row
+
+    figures = {None: {"trial.a": 3.0, "plan.zero": 0.0, "trial.n": None}, "other": {"trial.a": 4.0}}
+
+    def value(ours, unit=""):
+        (row,) = beside([Row(what="w", printed=1.0, unit=unit, ours=ours, source="")], figures)
+        assert isinstance(row, Beside)
+        return row.value, row.problem
+
+    assert value("trial.a") == (3.0, "")
+    assert value("trial.a", "mm") == (3000.0, "") and value("trial.a", "%") == (pytest.approx(300.0), "")
+    assert value("trial.a", "deg")[0] == pytest.approx(np.degrees(3.0))
+    assert value("trial.a / other:trial.a") == (0.75, "")
+    assert value("trial.a / plan.zero") == (None, "divided by zero")
+    assert value("trial.n")[0] is None and "no value" in value("trial.n")[1]
+    assert value("other:trial.b") == (None, "no trial.b there, but trial.a")
+    assert value("third:trial.a") == (None, "third was not run")
+
+
+def test_units_are_those_of_the_house():
+    assert [scale_of(u) for u in ("", "mm/s", "%", "N*m", "kg")] == pytest.approx([1.0, 1e-3, 0.01, 1.0, 1.0])
+    with pytest.raises(bp.InputError, match="furlong2"):
+        scale_of("furlong2")
+    assert [m.key for m in metrics_in("a-b:plan.x/trial.y")] == ["plan.x", "trial.y"]
+    assert metrics_in("a-b:plan.x")[0].mission == "a-b"
+
+
+@pytest.mark.parametrize(
+    "old,new,words",
+    [
+        ('unit = "mm/s"', 'unit = "mmm/s"', ["mmm/s", "mm/s"]),
+        ('ours = "trial.speed_m_s"\n', 'ours = "trial.sped"\n', ["sped", "Did you mean 'speed_m_s'", "advance_ratio"]),
+        ('ours = "trial.speed_m_s"\n', 'ours = "speed"\n', ["speed", "plan.NAME", "A / B"]),
+        ('ours = "trial.speed_m_s"\n', 'ours = "trial.a / trial.b / trial.c"\n', ["A / B"]),
+        ('ours = "trial.speed_m_s"\n', 'ours = "trail.speed_m_s"\n', ["trail", "trial"]),
+        ('ours = "trial.speed_m_s"\n', 'ours = "concertina:trial.speed_m_s"\n', ["concertina", "compare"]),
+        ('what = "gain"', 'wat = "gain"', ["wat", "what"]),
+        ("printed = 1.36", "printed = nan", ["printed", "finite"]),
+        ("printed = 1.36\n", "", ["printed", "missing"]),
+    ],
+)
+def test_wrong_rows_are_named_with_their_line(old, new, words):
+    text = MISSION + PAPER.replace(old, new)
+    assert new in text
+    with pytest.raises(bp.InputError) as caught:
+        parse(text)
+    assert "m.toml, line" in str(caught.value)
+    assert [w for w in words if w not in str(caught.value)] == []
+
+
+def test_the_line_is_that_of_the_right_table():
+    text = MISSION + PAPER.replace("printed = 1.36", 'printed = "x"')
+    with pytest.raises(bp.InputError) as caught:
+        parse(text)
+    line = 1 + text.splitlines().index('printed = "x"')
+    assert f"m.toml, line {line}:" in str(caught.value)
+
+
+def test_a_fact_that_the_plan_does_not_give_stops_before_the_physics():
+    said = []
+    mission = parse(MISSION + PAPER.replace("plan.speed", "plan.sped"))
+    with pytest.raises(bp.UnknownNameError, match=r"plan 'sped'.*Did you mean 'speed'"):
+        job.work(mission, progress=lambda step, part: said.append(step))
+    assert said == ["planning"]
+
+
+def test_without_physics_there_is_a_dash():
+    outcome = job.work(parse(MISSION + PAPER), simulate=False)
+    assert [row.value for row in outcome.paper] == [None, None]
+    assert all(row.problem for row in outcome.paper)
