@@ -225,3 +225,20 @@ def stick() -> bp.Motion:
     robot = bp.Robot.from_rows({"only": [bp.Row(a=0.1)]}, name="stick")
     t = np.array([0.0, 1.0, 1.5])
     return motion_of(robot, bp.Plane(), t, bases(t, (0.0, 0.0, 0.0)), np.zeros((3, 0)))
+
+
+@lru_cache
+def follower() -> bp.Motion:
+    """ACM-L2, whose double joints follow a curve with lifted bends, for two cycles."""
+    robot, gait = bp.acm_l2(), bp.SinusLifting(1.3, 0.3, 0.64, speed=0.16)
+    return bp.plan(robot, gait, bp.Plane(), bp.times(0.0, 8.0, dt=0.04))
+
+
+@lru_cache
+def roller() -> bp.Motion:
+    """Arc-shaped joints that bend a body into a helix, which rolls."""
+    gait = bp.Rolling(6.0, 1.5, 8.0)
+    robot = bp.snake(8, 0.06, joint="arc", axes="universal", radius=0.02)
+    period = gait.period(robot)
+    assert period is not None
+    return bp.plan(robot, gait, bp.Plane(), bp.times(0.0, period, dt=period / 100))

@@ -11,9 +11,14 @@ from pathlib import Path
 
 import pytest
 
+import bodyplan as bp
+from bodyplan.show.beside import Beside
+from bodyplan.show.fit_outcome import FitOutcome
+from bodyplan.show.fit_page import fit_page
+from bodyplan.show.outcome import Grid, GridPoint
 from bodyplan.show.playback import Playback
 from bodyplan.show.report import page
-from report_cases import cart, caterpillar, evil_report, outcome, stick
+from report_cases import cart, caterpillar, evil_report, follower, outcome, roller, stick
 
 
 @pytest.fixture(scope="session")
@@ -181,8 +186,34 @@ def test_playing_moves_on(report: Path, browse) -> None:  # type: ignore[no-unty
     assert found and float(found[1]) > 0.5
 
 
+def test_a_follower_has_its_curve_grid_and_plots(tmp_path: Path, browse) -> None:  # type: ignore[no-untyped-def]
+    points = tuple(GridPoint(m, v, "ok", "", v) for m in ("run", "<b>other</b>") for v in (0.2, 0.4))
+    grid = Grid("simulate.friction", "friction <i>", (0.2, 0.4), ("run", "<b>other</b>"), points)
+    paper = (
+        Beside("speed", 55.0, "mm/s", "trial.speed_m_s", "page 7", 54.0),
+        Beside("x", 1.0, "", "y", "", None, "no"),
+    )
+    made = outcome(None, follower(), name="run", grid=grid, paper=paper)
+    path = tmp_path / "follower.html"
+    path.write_text(page(made, Playback.of(made.motion, None), {}), encoding="utf-8")
+    dom = browse(path, 1000, "#t=1&view=top")
+    assert attributes(dom, "body")["data-ready"] == "replay" and "data-problems" not in attributes(dom, "html")
+    assert 'data-toggle="curve"' in dom
+    places = set(re.findall(r'data-plot="(\w+)"', dom))
+    assert {"overlay", "turning", "fit_error", "contacts", "grid"} <= places
+    assert dom.count('data-plot="') == dom.count('class="js-plotly-plot"')
+
+
+def test_the_page_of_a_fit_runs(tmp_path: Path, browse) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "fit.html"
+    path.write_text(fit_page(FitOutcome.of("spiral", bp.Spiral(), joints=5, convergence=True)), encoding="utf-8")
+    dom = browse(path, 1000)
+    assert attributes(dom, "body")["data-plots"] == "ready" and "data-problems" not in attributes(dom, "html")
+    assert dom.count('data-plot="') == dom.count('class="js-plotly-plot"') == 5
+
+
 def test_other_robots_play_too(tmp_path: Path, browse) -> None:  # type: ignore[no-untyped-def]
-    for number, motion in enumerate((cart(), caterpillar(), stick())):
+    for number, motion in enumerate((cart(), caterpillar(), stick(), roller())):
         path = tmp_path / f"{number}.html"
         path.write_text(page(outcome(None, motion), Playback.of(motion, None), {}), encoding="utf-8")
         dom = browse(path, 1000, "#t=1")

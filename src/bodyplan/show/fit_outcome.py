@@ -156,9 +156,9 @@ class FitOutcome:
 
 #: what the tables mean by straight links: two robots, each the one that its readers know
 STRAIGHT = (
-    "Straight links among the mechanisms of one number of joints are those of bp.snake: links that turn about one axis, "
-    "or twice as many with joints in turns, yaw at the first. Over the number of joints they are the paper's: twice as "
-    "many links with joints in turns, where the virtual joint at the tail yaws."
+    "Straight links beside the other mechanisms are those of bp.snake: as many links where the curve bends about one "
+    "axis, else twice as many with joints in turns, yaw first. Over the number of joints they are the paper's: twice "
+    "as many with joints in turns, where the virtual joint at the tail yaws."
 )
 
 
