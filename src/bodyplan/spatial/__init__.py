@@ -2,6 +2,7 @@
 
 from bodyplan.spatial.frames import GAUSS_NODES, curve_frames, frames_from_nodes
 from bodyplan.spatial.poses import apply, compose, inverse, matrix_from_pose, pose_from_matrix, relative
+from bodyplan.spatial.resampling import NodeSampling
 from bodyplan.spatial.rotations import (
     canonical,
     conjugate,
@@ -20,6 +21,7 @@ from bodyplan.spatial.twists import adjoint, adjoint_inverse, bracket, exp, log
 
 __all__ = [
     "GAUSS_NODES",
+    "NodeSampling",
     "adjoint",
     "adjoint_inverse",
     "apply",
