@@ -48,9 +48,10 @@ def test_help_names_the_commands():
     result = bodyplan("--help")
     assert result.exit_code == 0
     assert all(
-        name in result.output for name in ("run", "check", "export", "missions", "robots", "bodyplan run concertina")
+        name in result.output
+        for name in ("run", "check", "export", "fit", "missions", "robots", "bodyplan run concertina")
     )
-    for name in ("run", "check", "export", "missions", "robots"):
+    for name in ("run", "check", "export", "fit", "missions", "robots"):
         assert bodyplan(name, "--help").exit_code == 0
 
 
@@ -203,11 +204,12 @@ def test_export(finished, tmp_path, suffix):
 
 def test_missions_and_robots_are_listed():
     listed = bodyplan("missions")
-    assert listed.exit_code == 0 and "concertina-scales" in listed.output
+    assert listed.exit_code == 0 and "concertina-scales" in listed.output and "sinus-lifting" in listed.output
     assert 'kind = "corridor"' in bodyplan("missions", "concertina").output
     assert json.loads(bodyplan("missions", "--schema").output)["kinds"]
     robots = bodyplan("robots")
     assert robots.exit_code == 0 and "snake" in robots.output and "link_length" in robots.output
+    assert "acm_l2" in robots.output
 
 
 def test_version():
