@@ -95,7 +95,7 @@ def frames_from_nodes(shapes: ArrayLike, steps: ArrayLike, start: ArrayLike | No
         raise InputError(f"start: expected shape (7,) or (..., 7) with batch {lead}, got {begin.shape}.") from error
     begin[..., 3:] /= _unit_norms(begin[..., 3:])
     size = int(np.prod(lead, dtype=np.int64))
-    flat = np.array(u.reshape(size * len(h) * 3, 3), order="C")
+    flat = np.require(u.reshape(size * len(h) * 3, 3), requirements=["C", "W"])  # the kernels know one kind of array
     poses = np.empty((size * (len(h) + 1), 7))
     march(flat, np.array(h), begin.reshape(size, 7), poses)
     return poses.reshape(*lead, len(h) + 1, 7)
@@ -113,7 +113,7 @@ def _adaptive(shape: Callable[[Array], ArrayLike], s: Array, length: float, tole
     """Ends (N,) of the accepted steps in order, and their displacements (N, 7)."""
     if length == 0.0:
         return np.empty(0), np.empty((0, 7))
-    low, high = _first_steps(s, length / FIRST_STEPS)
+    low, high = _first_steps(s, max(length / FIRST_STEPS, np.finfo(np.float64).tiny))
     whole, _, _ = _displacements(shape, low, high, low[:0])
     done: list[tuple[Array, Array]] = []
     steps = len(low)
