@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -23,7 +25,7 @@ def bend(curve, a, b, axis):
     total = 0.0
     for low, high in zip([a, *places], [*places, b], strict=True):
         edges = np.linspace(low, high, 5)
-        for u, v in zip(edges[:-1], edges[1:], strict=True):
+        for u, v in pairwise(edges):
             total += (v - u) / 2 * float(w @ curve.shape(0.5 * (u + v) + 0.5 * (v - u) * x)[1 + axis])
     return total
 
@@ -64,7 +66,7 @@ def curve_path(curve, start, length):
 
     y, solutions = np.concatenate([np.zeros(3), np.eye(3).ravel()]), []
     stops = [0.0, *[b - start for b in curve.breaks if 0 < b - start < length], length]
-    for a, b in zip(stops, stops[1:], strict=False):
+    for a, b in pairwise(stops):
         out = solve_ivp(rates, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
         y = out.y[:, -1]
         solutions.append((a, b, out.sol))
@@ -148,14 +150,19 @@ def straight_chain(lengths, pitch, yaw):
     return chain
 
 
-def mean_distance(curve, chain, start=0.0, samples=4000):
-    """(E_nm, largest distance) by the trapezoid rule on each piece of the body; error about 1e-7 of E_nm and less."""
+def mean_distance(curve, chain, start=0.0, cells=1200):
+    """(E_nm, largest distance found) by Gauss's rule on many cells of the body: 1e-8 of E_nm where the distance dips to
+    zero with a corner, better elsewhere."""
     length = chain.s
+    x, w = np.polynomial.legendre.leggauss(5)
     total, largest = 0.0, 0.0
     path = curve_path(curve, start, length)
     for a, b, *_ in chain.pieces:
-        s = np.linspace(a, b, max(int(samples * (b - a) / length), 50) + 1)
-        d = np.linalg.norm(path(s) - chain.points(np.append(s[:-1], np.nextafter(b, a))), axis=1)
-        total += np.sum(0.5 * (d[1:] + d[:-1])) * (s[1] - s[0])
+        edges = np.linspace(a, b, max(int(cells * (b - a) / length), 20) + 1)
+        h = edges[1] - edges[0]
+        s = (edges[:-1, None] + 0.5 * h * (1 + x)).ravel()
+        s = np.append(s, np.nextafter(b, a))
+        d = np.linalg.norm(path(s) - chain.points(s), axis=1)
+        total += 0.5 * h * np.sum(d[:-1].reshape(-1, 5) @ w)
         largest = max(largest, d.max())
     return total / length**2, largest

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -71,7 +72,7 @@ def test_links_with_a_joint_of_the_axis_everywhere(axes):
     found = rule(robot).evaluate(BENT, 0.0, 0)
     for axis, kind in enumerate(("pitch", "yaw")):
         if axes in (kind, "universal"):
-            expected = [bend(BENT, a, b, axis) for a, b in zip(middle[:-1], middle[1:], strict=True)]
+            expected = [bend(BENT, a, b, axis) for a, b in pairwise(middle)]
             np.testing.assert_allclose(found.q[columns(robot, kind)], expected, atol=1e-12)
             assert found.kink[axis] == pytest.approx(bend(BENT, 0.0, middle[0], axis), abs=1e-12)
         else:
@@ -100,7 +101,7 @@ def test_alternating_arcs_are_taken_as_hinges_at_their_middles():
 
 
 def test_what_a_robot_bends_in_total():
-    """Arcs: the polyline meets the curve's turning at shares p and 1 - p in the mean, exactly for constant curvature."""
+    """Arcs: the polyline meets the curve's turning at shares p and 1 - p in the mean; constant curvature is met."""
     curve = Constant(kappa_p=0.7, kappa_y=-1.3)
     found = rule(bp.snake(5, LENGTHS, "arc", axes="universal")).evaluate(curve, 3.0)
     np.testing.assert_allclose(found.q.reshape(5, 2), np.outer(LENGTHS, [0.7, -1.3]), atol=1e-13)
