@@ -32,9 +32,7 @@ def mean_frames(robot: Robot, q: Array) -> Array:
 
 def mean_pose(poses: Array) -> Array:
     """The pose (7,) in the middle of poses (N, 7): mean position, chordal mean of the rotations."""
-    return np.concatenate(
-        [poses[:, :3].mean(axis=0), mean_rotation(matrix_from_quaternion(poses[:, 3:]).mean(axis=0))]
-    )
+    return np.concatenate([poses[:, :3].mean(axis=0), mean_rotation(matrix_from_quaternion(poses[:, 3:]).mean(axis=0))])
 
 
 def mean_rotation(total: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bodyplan import curves, fitting
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, TextArray
 from bodyplan.curves.base import BodyCurve
 from bodyplan.errors import InputError, Status
 from bodyplan.gaits.placing import TOLERANCE
@@ -24,7 +24,7 @@ from bodyplan.spatial.poses import IDENTITY
 if TYPE_CHECKING:
     from bodyplan.fitting import Bends
 
-#: share of a unit (see :class:`Following`) by which frames may leave the curve: a mechanism that is too coarse for it leaves it by more
+#: share of a unit (see :class:`Following`) by which frames may leave the curve; coarse mechanisms leave it by more
 NEAR = 0.5
 #: share of the speed along the body by which its frames may move otherwise (root mean square)
 SLIP = 0.35
@@ -96,7 +96,8 @@ class Following:
         """(T,) m: what eq. (1) leaves: the poses against an integration of the curve with wider steps."""
         probes = np.unique(np.linspace(0, len(s) - 1, min(len(s), PROBES)).round().astype(np.int64))
         points, _ = self.curve.frames(s[probes], IDENTITY, tolerance=100.0 * TOLERANCE)
-        return np.interp(np.arange(len(s)), probes, np.linalg.norm(points - poses[probes, :3], axis=-1))
+        off = np.linalg.norm(points - poses[probes, :3], axis=-1)
+        return np.asarray(np.interp(np.arange(len(s)), probes, off))
 
     def follows(self, pose: Array, places: Array, label: str = "frames on the body curve") -> Claim:
         """The claim that the frames are on the curve at ``places`` (T, F) m when its s = 0 lies at ``pose``."""
@@ -112,7 +113,7 @@ class Following:
             },
         )
 
-    def within_limits(self, q: Array) -> Array:
+    def within_limits(self, q: Array) -> TextArray:
         """(T,) status: "limit" where a joint is beyond its limits."""
         low, high = self.robot.limits[:, 0], self.robot.limits[:, 1]
         beyond = np.any((q < low - 1e-12) | (q > high + 1e-12), axis=1)

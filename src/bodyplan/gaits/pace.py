@@ -61,6 +61,6 @@ def _rise(t: Array, ramp: float) -> tuple[Array, Array, Array]:
     """Time at full speed that makes the same distance (s), share of the speed, and its rate (1/s)."""
     if ramp == 0.0:
         return t, np.ones_like(t), np.zeros_like(t)
-    x = np.clip(t / ramp, 0.0, 1.0)
+    x = np.clip(t, 0.0, ramp) / ramp
     distance = ramp * x**4 * (2.5 + x * (x - 3.0)) + np.maximum(t - ramp, 0.0)
     return distance, x**3 * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x**2 * (1.0 - x) ** 2 / ramp

@@ -91,7 +91,7 @@ def place(curve: BodyCurve, start: float, length: float) -> Placing:
     is laid by the stretch under the body.
     """
     repeat = curve.period
-    span = length if not repeat else repeat
+    span = repeat or length
     at = start + span * np.arange(SAMPLES + 1) / SAMPLES
     points, rotations = curve.frames(at, IDENTITY, tolerance=TOLERANCE)
     poses = np.concatenate([points, quaternion_from_matrix(rotations)], axis=-1)

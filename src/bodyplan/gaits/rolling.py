@@ -1,4 +1,4 @@
-"""Rolling: the body holds a shape while every section turns about its own centre line, over the floor or round a pole."""
+"""Rolling: the body keeps its shape while every section turns about its centre line, over the floor or round a pole."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ TOUCH, TOUCH_POLE = 0.05, 0.5
 
 class Rolling(Gait):
     """A body bent into an arc or a helix that stays as it is in space while every section rolls about its centre line:
-    ``kappa_y = k cos(twist s + rate t + phase)``, ``kappa_p = -k sin(twist s + rate t + phase)``, eq. (5) of paper *acm*
-    with a direction that turns.
+    ``kappa_y = k cos(twist s + rate t + phase)``, ``kappa_p = -k sin(twist s + rate t + phase)``, eq. (5) of paper
+    *acm* with a direction that turns.
 
     ``curvature`` k != 0 and ``twist`` (the torsion) in 1/m, ``rate`` != 0 in rad/s. Sections turn by -rate about the
     direction to the head, so their surface runs at rate times the radius r of the contacts. ``around``:
@@ -165,7 +165,7 @@ class Rolling(Gait):
             residual=np.full(len(t), body.residual),
             status=following.within_limits(joints.q),
             claims=claims,
-            contacts=contacts,
+            contacts=None if contacts is None else contacts.astype(np.float64),
             facts=self._facts(body, contacts is not None, float(heights.max()), grip["height"]),
             notes=tuple(self._notes(body)),
         )
@@ -204,8 +204,8 @@ class Rolling(Gait):
         notes = rule_notes(body.following)
         if self.around == "pole":
             notes.append(
-                f"The pole (radius {body.pole * 1e3:.4g} mm, through x = y = 0) is no ground: the plan says how the body "
-                "climbs it, physics does not try it."
+                f"The pole (radius {body.pole * 1e3:.4g} mm, through x = y = 0) is no ground: the plan says how the "
+                "body climbs it, physics does not try it."
             )
         elif self.twist == 0.0:
             notes.append("Only the middle of an arc rolls without slip: its ends point elsewhere.")
@@ -217,8 +217,8 @@ class Rolling(Gait):
 @dataclass(frozen=True, eq=False)
 class _Roll:
     """A :class:`Rolling` fitted to a robot. ``pose`` (7,) of the curve at rest at t = 0 (its frame at the tail),
-    ``motion`` (6,) the twist (m/s, rad/s) in the world that it moves on with; ``radius`` m of the contacts; ``axis`` (3,)
-    of the helix; ``pole`` m: radius of the pole it would grip; ``climb`` m/s along the axis; ``middle``: contacts
+    ``motion`` (6,) the twist (m/s, rad/s) in the world that it moves on with; ``radius`` m of the contacts; ``axis``
+    (3,) of the helix; ``pole`` m: radius of the pole it would grip; ``climb`` m/s along the axis; ``middle``: contacts
     on the straight part of an arc; ``residual`` m: how much the turning curve and the one at rest differ."""
 
     gait: Rolling
@@ -237,25 +237,27 @@ class _Roll:
         """InputError where the robot follows no curve, has no round contacts, or the pole would have no radius."""
         curve = Spiral(gait.curvature, gait.twist, phase=gait.phase)
         following = Following(robot, curve, gait.p)
-        for axis in ("pitch", "yaw"):
-            following.must_bend(Constant(**{f"kappa_{axis[0]}": gait.curvature}), 0.0, "Rolling")
+        following.must_bend(Constant(0.0, gait.curvature, gait.curvature), 0.0, "Rolling")
         length = following.length
         radii = [c.radius for c in robot.contacts if c.shape in ("capsule", "sphere")]
         if not radii:
-            raise InputError(f"Rolling: needs round contacts (capsules or spheres) to roll on; {robot.name!r} has none.")
+            raise InputError(
+                f"Rolling: needs round contacts (capsules or spheres) to roll on; {robot.name!r} has none."
+            )
         radius = max(radii)
         if gait.around == "floor" and gait.twist == 0.0:
-            made = _arc(gait, curve, length, radius)
+            pose, motion, axis, pole, climb = _arc(gait, length, radius)
         else:
-            made = _helix(gait, curve, length, radius)
+            pose, motion, axis, pole, climb = _helix(gait, curve, length, radius)
         rest = robot.forward(np.zeros(robot.n))
         at = {c.name: float(apply(rest[c.frame], c.points().mean(axis=0))[0]) for c in robot.contacts}
         middle = [name for name, x in at.items() if abs(x - 0.5 * length) * abs(gait.curvature) <= STRAIGHT]
         nearest = min(at, key=lambda name: abs(at[name] - 0.5 * length))
-        return cls(gait, following, *made[:2], radius, *made[2:], middle or [nearest], _difference(gait, length))
+        differ = _difference(gait, length)
+        return cls(gait, following, pose, motion, radius, axis, pole, climb, middle or [nearest], differ)
 
     def joints(self, t: Array) -> Joints:
-        """Joints at times t (T,): the bends turn by ``rate``, so that d(kappa_p, kappa_y)/dt = rate (-kappa_y, kappa_p)."""
+        """Joints at times t (T,): the bends turn, d(kappa_p, kappa_y)/dt = rate (-kappa_y, kappa_p)."""
         rate, nodes = self.gait.rate, self.following.rule.nodes
         whole = self.following.curve.integral(0.0, nodes)
         c, s = np.cos(rate * t)[:, None], np.sin(rate * t)[:, None]
@@ -265,12 +267,12 @@ class _Roll:
         return in_time(bends, np.ones(len(t)), np.zeros(len(t)))
 
 
-def _arc(gait: Rolling, curve: Spiral, length: float, radius: float) -> tuple[Array, Array, Array, float, float]:
+def _arc(gait: Rolling, length: float, radius: float) -> tuple[Array, Array, Array, float, float]:
     """Pose, motion, axis, pole radius and climb of an arc that lies flat, its middle along +x."""
     # the frame at the tail rolled so that the bend is in the plane, then the half angle back
     half = 0.5 * gait.curvature * length
     back = np.array([0.0, 0.0, 0.0, np.cos(0.5 * half), 0.0, 0.0, -np.sin(0.5 * half)])
-    pose = compose(back, rolled(np.asarray(gait.phase)))
+    pose = compose(back, rolled(np.asarray(-gait.phase)))
     motion = np.array([0.0, gait.rate * radius, 0.0, 0.0, 0.0, 0.0])
     return pose, motion, np.array([0.0, 0.0, 1.0]), 0.0, 0.0
 

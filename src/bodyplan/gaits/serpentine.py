@@ -1,10 +1,11 @@
-"""Serpentine movement: the body slides along a curve, so that the wave runs through it (paper *acm*, sections II to V)."""
+"""Serpentine movement: the body slides along a curve, so that the wave runs through it (paper *acm*, sections II-V)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -45,7 +46,7 @@ CLOSED = 1e-9
 
 
 class Serpentine(Gait):
-    """A body that moves along a curve: at time t it lies on arc lengths [sigma(t), sigma(t) + its length], head foremost.
+    """A body that moves along a curve: at time t it lies on arc lengths [sigma(t), sigma(t) + its length].
 
     ``curve``: a :class:`bodyplan.BodyCurve`, or its table. ``speed`` m/s along the body; ``direction`` 1 (the wave runs
     tailward and the body forward) or -1 (backward). ``start`` m: sigma at t = 0. ``ramp`` s: smooth start from rest,
@@ -107,9 +108,11 @@ class Serpentine(Gait):
             )
         else:
             self.steer = to_si(steer, "curvature", "steer")
-        self.changes = tuple((to_si(a, "time", "changes"), body_curve(b, "changes")) for a, b in _pairs(changes, "changes"))
+        self.changes = tuple(
+            (to_si(a, "time", "changes"), body_curve(b, "changes")) for a, b in _pairs(changes, "changes")
+        )
         for field, rows in (("steer", self.steer), ("changes", self.changes)):
-            if isinstance(rows, tuple) and any(b[0] <= a[0] for a, b in zip(rows, rows[1:], strict=False)):
+            if isinstance(rows, tuple) and any(b[0] <= a[0] for a, b in pairwise(rows)):
                 raise InputError(f"{field}: times must increase, got {[row[0] for row in rows]}.")
             if isinstance(rows, tuple) and rows and rows[0][0] < 0.0:
                 raise InputError(f"{field}: times must be >= 0, got {rows[0][0]}.")
@@ -206,7 +209,7 @@ class Serpentine(Gait):
             residual=following.residual(sigma, on_curve),
             status=following.within_limits(joints.q),
             claims=tuple(self._claims(body, placing, sigma, speed, base, on_curve, joints.kink, contacts is None)),
-            contacts=contacts,
+            contacts=None if contacts is None else contacts.astype(np.float64),
             facts=facts,
             notes=tuple(self._notes(body, placing, within if contacts is not None else None)),
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -38,13 +38,14 @@ class Sidewinding(Gait):
 
     The body runs through the wave at ``speed`` m/s (``direction`` 1: the wave runs tailward), and the wave moves so
     that the centre line is at rest at its lowest points: a cycle (wavelength / speed) displaces the body by the curve's
-    step over a wavelength less wavelength times the tangent at a lowest point. **The displacement points along +x**; the
-    body's axis lies at ``direction_angle`` (a fact of the plan) to it. The tail end starts at the world's origin, the
-    lowest contact of the whole motion touches the floor.
+    step over a wavelength less wavelength times the tangent at a lowest point. **The displacement points along +x**;
+    the body's axis lies at ``direction_angle`` (a fact of the plan) to it. The tail end starts at the world's origin,
+    the lowest contact of the whole motion touches the floor.
 
-    Two waves out of phase roll the curve about its axis over every wavelength, to first order by pi alpha_yaw alpha_pitch
-    sin(phase). A torsion ``.torsion`` (rad/m) undoes that and keeps the wave level. Joints that only bend follow it all
-    the same: their planes of bending are turned, place by place, from the middle of the body on.
+    Two waves out of phase roll the curve about its axis over every wavelength, to first order by
+    pi alpha_yaw alpha_pitch sin(phase). A torsion ``.torsion`` (rad/m) undoes that and keeps the wave level. Joints
+    that only bend follow it all the same: their planes of bending are turned, place by place, from the middle of the
+    body on.
 
     ``start`` m: place of the tail end on the wave at t = 0. ``p``: parameter of eqs. (11)-(16) of paper *acm*.
     ``touch`` m: contacts that come down to within this height count as touching (default: a tenth of the lift; see
@@ -152,7 +153,7 @@ class Sidewinding(Gait):
             claims.append(Claim("grips", "what touches the floor is at rest", data))
         notes = rule_notes(following)
         notes.append("The world's x axis is the direction of travel; the body lies at direction_angle to it.")
-        notes.append(f"A torsion of {level.torsion:.4g} rad/m keeps the wave level; planes of bending are turned by it.")
+        notes.append(f"A torsion of {level.torsion:.4g} rad/m keeps the wave level and turns the planes of bending.")
         notes.append(f"Contacts up to {within * 1e3:.3g} mm above the floor count as touching.")
         return Motion(
             robot=robot,
@@ -166,7 +167,7 @@ class Sidewinding(Gait):
             residual=following.residual(sigma, on_curve),
             status=following.within_limits(joints.q),
             claims=tuple(claims),
-            contacts=contacts,
+            contacts=None if contacts is None else contacts.astype(np.float64),
             facts=self._facts(body, level) | {"lift": lift, "contact_height": within},
             notes=tuple(notes),
         )
@@ -231,11 +232,12 @@ def _sidewinder(gait: Sidewinding, robot: Robot) -> _Sidewinder:
     return _Sidewinder(following, gait.torsion)
 
 
-def _wave(gait: Sidewinding, torsion: float, at: float = 0.0) -> BodyCurve:
+def _wave(gait: Sidewinding, torsion: float, at: float = 0.0, share: float = 1.0) -> BodyCurve:
+    """The wave from ``at`` m on, with a ``share`` of its amplitudes."""
     wave = gait.wavelength
     ahead = 2.0 * np.pi / wave * at
-    pitch = Serpenoid(gait.alpha_pitch, wave, wave, phase=gait.phase + ahead, plane="pitch")
-    return Serpenoid(gait.alpha_yaw, wave, wave, phase=ahead) + pitch + Constant(tau=torsion, length=wave)
+    pitch = Serpenoid(share * gait.alpha_pitch, wave, wave, phase=gait.phase + ahead, plane="pitch")
+    return Serpenoid(share * gait.alpha_yaw, wave, wave, phase=ahead) + pitch + Constant(tau=torsion, length=wave)
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,21 +291,45 @@ def _levelled(gait: Sidewinding) -> _Level:
 def _torsion(gait: Sidewinding) -> float:
     """The torsion with which the frame after a wavelength is the first one.
 
-    After half a wavelength both curvatures have changed sign, as if the frame had rolled by pi: with H the rotation over
-    half a wavelength, that over a whole one is (H Rx(pi))^2. It is the identity where H Rx(pi) turns by pi, so where the
-    quaternion of H has no x: one equation for one torsion.
+    After half a wavelength both curvatures have changed sign, as if the frame had rolled by pi: with H the rotation
+    over half a wavelength, that over a whole one is (H Rx(pi))^2. It is the identity where H Rx(pi) turns by pi, so
+    where the quaternion of H has no x: one equation for one torsion.
     """
-    from scipy.optimize import brentq
-
     wave = gait.wavelength
 
-    def roll(torsion: float) -> float:
-        frame = _wave(gait, torsion).frames(np.array([0.5 * wave]), IDENTITY, tolerance=1e-13)[1][0]
+    def roll(share: float, torsion: float) -> float:
+        frame = _wave(gait, torsion, share=share).frames(np.array([0.5 * wave]), IDENTITY, tolerance=1e-13)[1][0]
         return float(quaternion_from_matrix(frame)[1])
 
-    # to first order the roll over a wavelength is pi times the product of the amplitudes
-    reach = 2.0 * np.pi * (abs(gait.alpha_yaw * gait.alpha_pitch) + 1e-6) / wave
-    if roll(-reach) * roll(reach) >= 0.0:
-        raise InputError("alpha_yaw, alpha_pitch: no torsion keeps a wave of these amplitudes level; choose smaller ones.")
-    found: float = brentq(roll, -reach, reach, xtol=1e-15 / wave, rtol=1e-14)
-    return found
+    # of several torsions the one that grows from 0 with the amplitudes, at first with their product
+    steps = int(np.ceil(20.0 * (abs(gait.alpha_yaw) + abs(gait.alpha_pitch)))) + 1
+    torsion: float = -np.pi * gait.alpha_yaw * gait.alpha_pitch * np.sin(gait.phase) / (wave * steps**2)
+    for k in range(1, steps + 1):
+        share = k / steps
+        guess = torsion * (k / max(k - 1, 1)) ** 2
+        found = _secant(lambda x, f=share: roll(f, x), guess, 1e-4 / wave)  # type: ignore[misc]
+        jumps = found is None or abs(found - guess) > 0.3 * abs(guess) + 0.05 / wave
+        if found is None or jumps or abs(found) * wave >= np.pi:
+            raise InputError(
+                "alpha_yaw, alpha_pitch: no torsion keeps a wave of these amplitudes level; choose smaller ones."
+            )
+        torsion = found
+    return torsion
+
+
+def _secant(f: Callable[[float], float], guess: float, step: float) -> float | None:
+    """The root of ``f`` near ``guess``, to rounding; None where it does not settle."""
+    x, y = guess, guess + step
+    fx, fy = f(x), f(y)
+    for _ in range(40):
+        if fy == fx:
+            return y if abs(fy) < 1e-14 else None
+        x, fx, y = y, fy, y - fy * (y - x) / (fy - fx)
+        if not abs(y - guess) < 1e6 * step:
+            return None
+        if abs(y - x) <= 1e-11 * step:
+            return y
+        fy = f(y)
+        if abs(fy) <= 1e-16:
+            return y
+    return y if abs(fy) < 1e-13 else None

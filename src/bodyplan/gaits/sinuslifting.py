@@ -1,10 +1,11 @@
-"""Sinus-lifting: serpentine movement that lifts the bends, where a body slips sideways most (paper *acm*, section V)."""
+"""Sinus-lifting: serpentine movement with the bends lifted, where a body slips most (paper *acm*, section V)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from bodyplan.arrays import number
 from bodyplan.curves.sinuslift import SinusLift
 from bodyplan.gaits.serpentine import Serpentine
 
@@ -12,9 +13,9 @@ from bodyplan.gaits.serpentine import Serpentine
 class SinusLifting(Serpentine):
     """:class:`Serpentine` along a :class:`bodyplan.SinusLift`, eqs. (35), (36).
 
-    ``alpha`` rad, ``lift`` (c0; 0 is plain serpentine movement, > 0 lifts the bends), ``wavelength`` m and ``c1`` (None:
-    the value that keeps the curve level; "paper": eq. (37); or a number) are those of the curve; all others those of
-    :class:`Serpentine`. ``motion.contacts`` says which contacts touch, which are the ones where the curve bends least.
+    ``alpha`` rad, ``lift`` (c0; 0 is plain serpentine movement, > 0 lifts the bends), ``wavelength`` m and ``c1``
+    (None: the value that keeps the curve level; "paper": eq. (37); or a number) are those of the curve; all others
+    those of :class:`Serpentine`. ``motion.contacts`` says which contacts touch: those where the curve bends least.
 
     Raises InputError for values out of range, or where no c1 keeps the curve level.
     """
@@ -47,10 +48,9 @@ class SinusLifting(Serpentine):
         start: float = 0.0,
         touch: float | None = None,
     ) -> None:
+        wavelength = number(wavelength, "wavelength", above=0.0)
         curve = SinusLift(alpha, lift, wavelength, c1, length=wavelength)
-        super().__init__(
-            curve, speed, direction, steer, base=base, ramp=ramp, stop=stop, p=p, start=start, touch=touch
-        )
+        super().__init__(curve, speed, direction, steer, base=base, ramp=ramp, stop=stop, p=p, start=start, touch=touch)
         self._wave = {"alpha": curve.alpha, "lift": curve.lift, "wavelength": curve.wavelength, "c1": c1}
 
     def to_dict(self) -> dict[str, Any]:
