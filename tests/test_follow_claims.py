@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import bodyplan as bp
+from bodyplan.check import claims
 from bodyplan.motion import Claim
 from bodyplan.spatial import compose, inverse, rotations
 
@@ -64,16 +65,16 @@ def test_time_run_backwards_is_refused(serpentine):
     assert {"follows", "no_slip", "periodic"} <= failed(back)
     assert value(back, "no_slip").value == pytest.approx(2.0, abs=0.1)
     # a planner that claims the places of the reversed motion still slips
-    claims = [
+    said = [
         Claim(c.kind, c.label, {**c.data, "places": np.asarray(c.data["places"])[::-1]}) if c.kind == "follows" else c
         for c in serpentine.claims
     ]
-    assert "no_slip" in failed(back.replace(claims=tuple(claims)))
+    assert "no_slip" in failed(back.replace(claims=tuple(said)))
 
 
 def with_claim(motion, kind, **data):
-    claims = [Claim(c.kind, c.label, {**c.data, **data}) if c.kind == kind else c for c in motion.claims]
-    return motion.replace(claims=tuple(claims))
+    said = [Claim(c.kind, c.label, {**c.data, **data}) if c.kind == kind else c for c in motion.claims]
+    return motion.replace(claims=tuple(said))
 
 
 def claim_of(motion, kind):
@@ -156,5 +157,5 @@ def test_what_cannot_be_tested_says_so():
 def test_many_places_are_thinned_out_and_said_so():
     robot = bp.snake(120, 0.01, "arc", axes="yaw", radius=0.001)
     motion = bp.plan(robot, bp.Serpentine({**WAVE, "alpha": 0.5}, 0.16), bp.Plane(), np.linspace(0.0, 4.0, 2001))
-    line = value(motion, "follows")
+    line = claims.follows(motion, motion.poses().positions, claim_of(motion, "follows"))
     assert line.passed and line.detail.startswith("1001 samples")
