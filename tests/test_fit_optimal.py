@@ -133,7 +133,7 @@ def test_within_limits_and_stationary_there(limit):
     start=st.floats(-1, 1),
     limit=st.floats(0.1, 1.5),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_never_worse_than_the_rule_within_limits(n, kind, axes, alpha, twist, start, limit):
     links = n + (kind == "straight")
     robot = bp.snake(links, 1 / links, kind, axes=axes, limits=(-limit, limit))

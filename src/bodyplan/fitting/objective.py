@@ -6,10 +6,15 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.fitting.distance import CELL_TOLERANCE, integrate
-from bodyplan.fitting.following import Following, segment_data
+from bodyplan.fitting.following import Following, body_points, segment_data
 from bodyplan.fitting.rules import kink_quaternion
 from bodyplan.robot.elements import Arc, Joint
-from bodyplan.spatial import compose, left_jacobian, matrix_from_quaternion
+from bodyplan.spatial import GAUSS_NODES, compose, left_jacobian, matrix_from_quaternion
+
+#: weights of the three-point rule at GAUSS_NODES
+GAUSS_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+#: rad: step of the differences in :meth:`Objective.metric`
+STEP = 1e-6
 
 
 class Objective:
@@ -82,19 +87,18 @@ class Objective:
 
     def metric(self, x: Array) -> Array:
         """(n + k, n + k): mean square, over the body, of how far its points move with the unknowns, in body lengths.
-        Divided by the distance it is about the Hessian: what an optimiser should be told."""
-        q, kink = np.ascontiguousarray(x[: self.n]), self.full_kink(x)
+        Divided by the distance it is about the Hessian: what an optimiser should be told. To 1e-6 or so."""
         hinged = self._made.kind == "straight"
-        base = compose(self._tail, np.concatenate([np.zeros(3), kink_quaternion(kink, hinged)])[None])[0]
-        segments = self._made.segments
-        at = self._robot.ends_and_jacobians(q, base, frames=tuple(self._robot.frames[s.first + 1] for s in segments))
-        moves = at.stacked().reshape(len(segments), 6, -1)[:, :3]
-        turns = self._kink_axes(kink, hinged)[self._axes]
-        arms = at.positions - base[:3]
-        kinks = np.cross(turns[None], arms[:, None]).swapaxes(1, 2)
-        J = np.concatenate([at.rotations @ moves, kinks], axis=2)
-        weights = np.array([s.end - s.start for s in segments]) / self._made.length**3
-        return np.asarray(np.einsum("s,sia,sib->ab", weights, J, J, optimize=True))
+        all_x = np.vstack([x, x + STEP * np.eye(len(x))])
+        kinks = np.stack([self.full_kink(each) for each in all_x])
+        turns = np.concatenate([np.zeros((len(kinks), 3)), kink_quaternion(kinks, hinged)], axis=1)
+        q = np.ascontiguousarray(all_x[:, : self.n])
+        low, high = self._segments[:, 0], self._segments[:, 1]
+        s = (low[:, None] + (high - low)[:, None] * np.array(GAUSS_NODES)).ravel()
+        points = body_points(self._robot, self._made, q, compose(self._tail, turns), s)
+        moves = (points[1:] - points[0]).reshape(len(x), -1, 3) / (STEP * self._made.length)
+        weights = np.outer((high - low) / self._made.length, GAUSS_WEIGHTS).ravel()
+        return np.asarray(np.einsum("asi,bsi,s->ab", moves, moves, weights, optimize=True))
 
     def _pulls(self, wrenches: Array) -> tuple[Array, Array]:
         """Forces and moments (F, 3) on the frames."""

@@ -80,10 +80,10 @@ def _search(goal: Objective, begin: Array, unit: float, low: Array, high: Array)
     zero = np.zeros(len(begin))
     small = len(begin) <= DENSE_UP_TO
     free: Any = {"method": "SLSQP" if small else "L-BFGS-B", "options": SLSQP if small else LBFGS}
-    x = begin + change @ minimize(scaled, zero, jac=True, **free).x
-    inside = np.clip(x, low, high)
-    if np.array_equal(x, inside):
-        return x
+    if np.all((low < begin) & (begin < high)):
+        x = begin + change @ minimize(scaled, zero, jac=True, **free).x
+        if np.array_equal(x, np.clip(x, low, high)):
+            return x
     if small:
         bound = np.isfinite(low) | np.isfinite(high)
         within = LinearConstraint(change[bound], (low - begin)[bound], (high - begin)[bound])
