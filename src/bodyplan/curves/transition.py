@@ -17,7 +17,10 @@ from bodyplan.errors import InputError
 def blend(u: Array) -> Array:
     """The quintic smoothstep: 0 up to u = 0, 1 from u = 1 on, first and second derivative continuous."""
     x = np.clip(u, 0.0, 1.0)
-    return np.asarray(x * x * x * (10.0 + x * (6.0 * x - 15.0)))
+    # from the nearer end: terms of the polynomial cancel near the other
+    y = np.minimum(x, 1.0 - x)
+    near = y * y * y * (10.0 + y * (6.0 * y - 15.0))
+    return np.asarray(np.where(x <= 0.5, near, 1.0 - near))
 
 
 def blend_slope(u: Array) -> Array:
