@@ -14,6 +14,7 @@ from bodyplan.fitting.objective import Objective
 #: an optimiser that begins again at its result must not find more than this share
 CONVERGED = 1e-9
 RESTARTS = 8
+BFGS: dict[str, Any] = {"maxiter": 500, "gtol": 1e-8}
 SLSQP: dict[str, Any] = {"maxiter": 500, "ftol": 1e-13}
 LBFGS: dict[str, Any] = {"maxiter": 3000, "maxcor": 50, "ftol": 1e-14, "gtol": 1e-12}
 #: of the trace: what keeps the metric regular
@@ -79,15 +80,16 @@ def _search(goal: Objective, begin: Array, unit: float, low: Array, high: Array)
 
     zero = np.zeros(len(begin))
     small = len(begin) <= DENSE_UP_TO
-    free: Any = {"method": "SLSQP" if small else "L-BFGS-B", "options": SLSQP if small else LBFGS}
     if np.all((low < begin) & (begin < high)):
+        # in plain NumPy, and a batch of small fits pays dearly for threads inside LAPACK
+        free: Any = {"method": "BFGS", "options": BFGS} if small else {"method": "L-BFGS-B", "options": LBFGS}
         x = begin + change @ minimize(scaled, zero, jac=True, **free).x
         if np.array_equal(x, np.clip(x, low, high)):
             return x
     if small:
         bound = np.isfinite(low) | np.isfinite(high)
         within = LinearConstraint(change[bound], (low - begin)[bound], (high - begin)[bound])
-        x = begin + change @ minimize(scaled, zero, jac=True, constraints=within, **free).x
+        x = begin + change @ minimize(scaled, zero, jac=True, method="SLSQP", constraints=within, options=SLSQP).x
         return np.clip(x, low, high)
     scale = unit / np.sqrt(np.diag(metric))
 
@@ -96,4 +98,5 @@ def _search(goal: Objective, begin: Array, unit: float, low: Array, high: Array)
         return value / unit, scale * gradient / unit
 
     limits = Bounds((low - begin) / scale, (high - begin) / scale)
-    return np.clip(begin + scale * minimize(bounded, zero, jac=True, bounds=limits, **free).x, low, high)
+    found = minimize(bounded, zero, jac=True, method="L-BFGS-B", bounds=limits, options=LBFGS)
+    return np.clip(begin + scale * found.x, low, high)
