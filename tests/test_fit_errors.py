@@ -247,6 +247,17 @@ def test_a_helix_looks_the_same_everywhere():
     np.testing.assert_allclose(errors, errors[0], rtol=1e-9)
 
 
+def test_far_along_a_wave_and_in_other_units():
+    """Places of 1e6 m are rounded to 1e-10 m: the estimate says so, and no more is lost."""
+    near = bp.fit(SERPENOID, links(10)).error
+    far = bp.fit(SERPENOID, links(10), start=[1e3, -1e6])
+    assert np.all(np.abs(far.error - near) <= 1e-13 + far.quadrature_error)
+    assert far.quadrature_error[0] < 5e-12 and far.quadrature_error[1] < 1e-8
+    for unit in (1e-3, 1e3):
+        found = bp.fit(bp.Spiral(length=unit), bp.snake(10, 0.1 * unit, "arc", axes="universal"))
+        assert found.error == pytest.approx(bp.fit(SPIRAL, arcs(10)).error, abs=2e-12)
+
+
 def test_planar_robots_on_curves_in_space_do_what_they_can():
     found = bp.fit(LIFTED, links(12, "yaw"))
     flat = bp.fit(bp.Serpenoid(5 * np.pi / 12), links(12, "yaw"))

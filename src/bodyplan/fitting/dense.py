@@ -69,7 +69,7 @@ def dense_curve(curve: BodyCurve, low: float, high: float, body: float) -> Dense
     end = np.append(start[1:], high)
     whole = _steps(curve, start, end)
     done: list[tuple[Array, Array, Array]] = []
-    error, cells = 0.0, len(start)
+    error, cells, blurred = 0.0, len(start), TOLERANCE
     while len(start):
         middle = start + 0.5 * (end - start)
         edges = np.stack([start, middle, end], axis=1)
@@ -78,7 +78,12 @@ def dense_curve(curve: BodyCurve, low: float, high: float, body: float) -> Dense
         bends = _bends_at_ends(curve, edges, breaks)
         off = np.empty(len(start))
         _differences(whole, halves, bends, end - start, body, off)
-        good = (off <= np.maximum(TOLERANCE * (end - start), ROUNDING * body)) | (middle <= start) | (middle >= end)
+        h = end - start
+        if not done:
+            # far from 0 the places are rounded, and the curvature there with them
+            slope = float((np.abs(bends[:, 1] - bends[:, 0]).max(axis=1) / np.repeat(0.5 * h, 2)).max())
+            blurred = TOLERANCE + 4.0 * np.spacing(max(abs(low), abs(high))) * slope * body
+        good = (off <= np.maximum(blurred * h, ROUNDING * body)) | (middle <= start) | (middle >= end)
         both = np.repeat(good, 2)
         done.append((first[both], halves[both], bends[both]))
         error += float(off[good].sum()) / 32.0

@@ -16,6 +16,7 @@ from bodyplan.fitting.angles import JointAngles
 from bodyplan.fitting.extent import extent
 from bodyplan.fitting.following import Following, body_points, followings
 from bodyplan.fitting.mechanism import PITCH, YAW, Mechanism, mechanism
+from bodyplan.fitting.optimal import EXACT, optimal
 from bodyplan.fitting.rules import kink_quaternion, rule
 from bodyplan.fitting.turning import body_turning
 from bodyplan.robot.model import Robot
@@ -197,10 +198,11 @@ class Fit:
 
     @property
     def gain(self) -> Any:
-        """(...): ``error`` over that of the paper's rule (1 for the rule itself). Above 1 only where the rule is beyond
-        the joint limits."""
+        """(...): ``error`` over that of the paper's rule; 1 for the rule itself, and where it leaves only rounding.
+        Above 1 only where the rule is beyond the joint limits."""
         mine, theirs = self._errors[..., 0], self.paper._errors[..., 0]
-        return self._scalars(np.where(theirs > 0.0, mine / np.where(theirs > 0.0, theirs, 1.0), 1.0))
+        some = theirs > EXACT
+        return self._scalars(np.where(some, mine / np.where(some, theirs, 1.0), 1.0))
 
     # --- limits and status ----------------------------------------------------------------------------------------
 
@@ -315,8 +317,6 @@ def fit(
     paper = Fit(robot, curves, many, begin, "paper", p, q, kink, fine)
     if method == "paper":
         return paper
-    from bodyplan.fitting.optimal import optimal  # it needs scipy.optimize
-
     axes = [axis for axis in (PITCH, YAW) if axis in angles.mechanism.axes]
     q, kink, fine = optimal(paper._followings, paper._q, paper._kink, axes)
     return Fit(robot, curves, many, begin, "optimal", p, q, kink, fine, paper)

@@ -6,7 +6,7 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.fitting.distance import CELL_TOLERANCE, integrate
-from bodyplan.fitting.following import Following, body_points, segment_data
+from bodyplan.fitting.following import Following, body_points
 from bodyplan.fitting.rules import kink_quaternion
 from bodyplan.robot.elements import Arc, Joint
 from bodyplan.spatial import GAUSS_NODES, compose, left_jacobian, matrix_from_quaternion
@@ -39,19 +39,24 @@ class Objective:
         segments = self._made.segments
         self._first = np.array([s.first for s in segments])
         self._arc = np.array([s.arc for s in segments])
-        # frames that something pulls at, without the base
-        self._frames = np.unique(np.concatenate([self._first, self._first[~self._arc] + 1]))
+        # the frames at the ends of segments; the base, which is none of them, counts as the last one
+        self._frames = np.unique(np.concatenate([self._first, self._first + 1]))
         self._frames = self._frames[self._frames > 0]
         self._names = tuple(self._robot.frames[f] for f in self._frames)
+        self._from = np.where(self._first > 0, np.searchsorted(self._frames, self._first), len(self._frames))
+        self._to = np.searchsorted(self._frames, self._first + 1)
         column = {name: i for i, name in enumerate(self._robot.joints)}
-        bends = []  # segment, 0 pitch or 1 yaw, joint, scale
+        self._data = np.zeros((len(segments), 17))
+        bends = []  # segment, column of pitch or yaw, joint, scale
         for i, s in enumerate(segments):
             element = self._robot.elements[s.first]
             if isinstance(element, Arc):
                 for k, bend in enumerate((element.pitch, element.yaw)):
                     if isinstance(bend, Joint):
-                        bends.append((i, 6 + k, column[bend.name], bend.scale))
-        self._bends = bends
+                        bends.append((i, k, column[bend.name], bend.scale))
+        table = np.array(bends).reshape(-1, 4)
+        self._bent, self._axis, self._joint = table[:, :3].astype(np.int64).T
+        self._scale = table[:, 3]
 
     def full_kink(self, x: Array) -> Array:
         """(pitch, yaw) rad."""
@@ -64,25 +69,30 @@ class Objective:
         q, kink = np.ascontiguousarray(x[: self.n]), self.full_kink(x)
         hinged = self._made.kind == "straight"
         turn = kink_quaternion(kink, hinged)
-        base = compose(self._tail, np.concatenate([np.zeros(3), turn])[None])
-        data = segment_data(self._robot, self._made, q[None], base)[0]
-        wrenches = np.empty((len(self._segments), 8))
+        base = compose(self._tail[0], np.concatenate([np.zeros(3), turn]))
+        at = self._robot.ends_and_jacobians(q, base, frames=self._names)
+        positions = np.concatenate([at.positions, base[None, :3]])
+        rotations = np.concatenate([at.rotations, matrix_from_quaternion(base[3:])[None]])
+        data = self._data
+        data[:, :3], data[:, 3:6] = positions[self._from], positions[self._to]
+        data[:, 6:15] = rotations[self._from].swapaxes(1, 2).reshape(-1, 9)
+        data[self._bent, 15 + self._axis] = self._scale * q[self._joint]
+        wrenches = np.empty((len(data), 8))
         size = self._made.length**2
         cells = (self._segments, data, self._dense.ends, self._dense.cells)
         total, _ = integrate(self._start, self._stops, self._owners, *cells, CELL_TOLERANCE * size, wrenches)
 
-        force, moment = self._pulls(wrenches)
-        at = self._robot.ends_and_jacobians(q, base[0], frames=self._names)
-        own = np.concatenate([(force[:, None] @ at.rotations)[:, 0], (moment[:, None] @ at.rotations)[:, 0]], axis=1)
+        pull = self._pulls(wrenches)
+        own = np.concatenate([pull[:-1, None, :3] @ at.rotations, pull[:-1, None, 3:] @ at.rotations], axis=2)[:, 0]
         gradient = np.zeros(len(x))
-        rows = np.repeat(np.arange(len(self._frames)), np.diff(at.offsets))
+        rows = np.repeat(np.arange(len(own)), np.diff(at.offsets))
         np.add.at(gradient, at.joints, np.einsum("kc,kc->k", at.twists, own[rows]))
-        for segment, column, joint, scale in self._bends:
-            gradient[joint] += scale * wrenches[segment, column]
-
-        arms = at.positions - base[0, :3]
-        about = np.cross(arms, force).sum(axis=0) + moment.sum(axis=0) + self._base_moment(wrenches)
-        gradient[self.n :] = (self._kink_axes(kink, hinged) @ about)[self._axes]
+        np.add.at(gradient, self._joint, self._scale * wrenches[self._bent, 6 + self._axis])
+        # everything turns about the base
+        arms = positions - base[:3]
+        about = np.einsum("fa,fb->ab", arms, pull[:, :3])
+        moment = np.array([about[1, 2] - about[2, 1], about[2, 0] - about[0, 2], about[0, 1] - about[1, 0]])
+        gradient[self.n :] = (self._kink_axes(kink, hinged) @ (moment + pull[:, 3:].sum(axis=0)))[self._axes]
         return total / size, gradient / size
 
     def metric(self, x: Array) -> Array:
@@ -100,20 +110,13 @@ class Objective:
         weights = np.outer((high - low) / self._made.length, GAUSS_WEIGHTS).ravel()
         return np.asarray(np.einsum("asi,bsi,s->ab", moves, moves, weights, optimize=True))
 
-    def _pulls(self, wrenches: Array) -> tuple[Array, Array]:
-        """Forces and moments (F, 3) on the frames."""
-        force, moment = np.zeros((len(self._frames) + 1, 3)), np.zeros((len(self._frames) + 1, 3))
-        # the base, which is not among the frames, is last
-        first = np.where(self._first > 0, np.searchsorted(self._frames, self._first), -1)
-        np.add.at(force, first, wrenches[:, :3])
-        np.add.at(moment, first[self._arc], wrenches[self._arc, 3:6])
-        line = ~self._arc
-        np.add.at(force, np.searchsorted(self._frames, self._first[line] + 1), wrenches[line, 3:6])
-        return force[:-1], moment[:-1]
-
-    def _base_moment(self, wrenches: Array) -> Array:
-        """(3,): what an arc that begins at the base turns it by."""
-        return np.asarray(wrenches[self._arc & (self._first == 0), 3:6].sum(axis=0))
+    def _pulls(self, wrenches: Array) -> Array:
+        """Forces and moments (F + 1, 6) on the frames and, last, on the base."""
+        pull = np.zeros((len(self._frames) + 1, 6))
+        np.add.at(pull[:, :3], self._from, wrenches[:, :3])
+        np.add.at(pull[:, 3:], self._from[self._arc], wrenches[self._arc, 3:6])
+        np.add.at(pull[:, :3], self._to[~self._arc], wrenches[~self._arc, 3:6])
+        return pull
 
     def _kink_axes(self, kink: Array, hinged: bool) -> Array:
         """(2, 3): the axes about which the base turns with the kink's pitch and yaw."""

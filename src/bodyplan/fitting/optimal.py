@@ -68,7 +68,9 @@ def _search(goal: Objective, begin: Array, unit: float, low: Array, high: Array)
     The unknowns are changed so that the Hessian there is about the identity: with joint angles its condition grows
     with the fourth power of the number of links. Limits then are linear constraints, met only where they matter.
     """
-    from scipy.optimize import Bounds, LinearConstraint, minimize  # half a second to load
+    from scipy import optimize  # half a second to load
+
+    minimize: Any = optimize.minimize  # its overloads do not know options by name
 
     metric = goal.metric(begin)
     metric += FLOOR * np.trace(metric) * np.eye(len(metric))
@@ -85,18 +87,18 @@ def _search(goal: Objective, begin: Array, unit: float, low: Array, high: Array)
         free: Any = {"method": "BFGS", "options": BFGS} if small else {"method": "L-BFGS-B", "options": LBFGS}
         x = begin + change @ minimize(scaled, zero, jac=True, **free).x
         if np.array_equal(x, np.clip(x, low, high)):
-            return x
+            return np.asarray(x)
     if small:
         bound = np.isfinite(low) | np.isfinite(high)
-        within = LinearConstraint(change[bound], (low - begin)[bound], (high - begin)[bound])
+        within = optimize.LinearConstraint(change[bound], (low - begin)[bound], (high - begin)[bound])
         x = begin + change @ minimize(scaled, zero, jac=True, method="SLSQP", constraints=within, options=SLSQP).x
-        return np.clip(x, low, high)
+        return np.asarray(np.clip(x, low, high))
     scale = unit / np.sqrt(np.diag(metric))
 
     def bounded(z: Array) -> tuple[float, Array]:
         value, gradient = goal(np.clip(begin + scale * z, low, high))
         return value / unit, scale * gradient / unit
 
-    limits = Bounds((low - begin) / scale, (high - begin) / scale)
+    limits = optimize.Bounds((low - begin) / scale, (high - begin) / scale)
     found = minimize(bounded, zero, jac=True, method="L-BFGS-B", bounds=limits, options=LBFGS)
-    return np.clip(begin + scale * found.x, low, high)
+    return np.asarray(np.clip(begin + scale * found.x, low, high))
