@@ -14,7 +14,8 @@ from bodyplan.fitting.objective import Objective
 #: an optimiser that begins again at its result must not find more than this share
 CONVERGED = 1e-9
 RESTARTS = 8
-BFGS: dict[str, Any] = {"maxiter": 500, "gtol": 1e-8}
+#: the gradient, where the Hessian is about 1: its square is what is left of E
+BFGS: dict[str, Any] = {"maxiter": 500, "gtol": 1e-5}
 SLSQP: dict[str, Any] = {"maxiter": 500, "ftol": 1e-13}
 LBFGS: dict[str, Any] = {"maxiter": 3000, "maxcor": 50, "ftol": 1e-14, "gtol": 1e-12}
 #: of the trace: what keeps the metric regular
