@@ -15,7 +15,8 @@ import bodyplan as bp
 from bodyplan.metrics import metrics_of
 from bodyplan.show.figures import write_figures
 from bodyplan.show.fitted import Drawn
-from bodyplan.show.following import Following, following_section
+from bodyplan.show.following import Following
+from bodyplan.show.following_page import following_section
 from bodyplan.show.path import planned_path
 from bodyplan.show.playback import Playback
 from bodyplan.show.report import page

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bodyplan.errors import MissingExtraError
-from bodyplan.show.following import following_figure
+from bodyplan.show.following_page import following_figure
 from bodyplan.show.grids import grid_figure
 from bodyplan.show.keyframes import body_keyframes
 from bodyplan.show.outcome import Outcome

@@ -9,7 +9,7 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.show.figures import STRIPES, peak_and_rms
-from bodyplan.show.following import following_plots
+from bodyplan.show.following_page import following_plots
 from bodyplan.show.grids import grid_plot
 from bodyplan.show.layout import label, layout, line
 from bodyplan.show.outcome import Outcome, five_point_gaps, five_point_rates

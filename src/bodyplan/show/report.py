@@ -13,7 +13,7 @@ from bodyplan.show import sections
 from bodyplan.show.document import document
 from bodyplan.show.execution import execution
 from bodyplan.show.figures import write_figures
-from bodyplan.show.following import following_section
+from bodyplan.show.following_page import following_section
 from bodyplan.show.grids import grid_section
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.overview import head
