@@ -62,7 +62,8 @@ def test_spiral_is_a_helix(k: float, t: float, phase: float, s: float) -> None:
     across, along = forward - (forward @ axis) * axis, (forward @ axis) * axis
     side = np.cross(axis, forward)
     if size > 0.0:
-        place = along * s + across * np.sin(size * s) / size + side * (1.0 - np.cos(size * s)) / size
+        rise = 2.0 * np.sin(0.5 * size * s) ** 2 / size  # (1 - cos)/size without its cancellation
+        place = along * s + across * np.sin(size * s) / size + side * rise
     else:
         place = forward * s
     e_r = along + across * np.cos(size * s) + side * np.sin(size * s)

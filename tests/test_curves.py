@@ -201,3 +201,10 @@ def test_every_kind_is_registered() -> None:
     assert {type(curve) for curve in CURVES.values()} == set(bc.KINDS.values())
     for name in ("BodyCurve", "Sampled", "Segments", "Serpenoid", "SinusLift", "Spiral"):
         assert getattr(bp, name) is getattr(bc, name)
+
+
+def test_a_curve_cannot_be_changed() -> None:
+    curve = bp.Serpenoid(1.0)
+    with pytest.raises(AttributeError, match="make a new one"):
+        curve.alpha = 2.0
+    assert curve.alpha == 1.0

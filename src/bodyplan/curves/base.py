@@ -134,6 +134,12 @@ class BodyCurve(ABC):
 
         return Untwisted(self)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        # what is kept of a curve (integrals, frames) would not notice a change
+        if not name.startswith("_") and name in self.__dict__:
+            raise AttributeError(f"{type(self).__name__}.{name}: a curve cannot be changed; make a new one.")
+        super().__setattr__(name, value)
+
     def __add__(self, other: BodyCurve) -> BodyCurve:
         if not isinstance(other, BodyCurve):
             return NotImplemented
