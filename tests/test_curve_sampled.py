@@ -148,6 +148,34 @@ def test_far_from_the_origin() -> None:
     assert np.abs(np.stack(far.shape(s)) - np.stack(exact.shape(s))).max() < 1e-10
 
 
+def helix(t: np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(t), np.sin(t), 0.3 * t], axis=1)
+
+
+def test_long_curves_end() -> None:
+    # parameters far from 0 have few digits left: cells were halved without end where they were counted from there
+    points = helix(np.linspace(0.0, 300.0, 3000))
+    sampled = bp.Sampled(points)
+    # the speed of a cubic spline is off by about h^4 / 720 in the mean
+    assert sampled.length == pytest.approx(300.0 * np.hypot(1.0, 0.3), rel=0.1**4 / 500.0)
+    assert np.abs(sampled.frames(sampled.stations)[0] - points).max() < 1e-12
+    inside = sampled.stations[10:-10]
+    assert np.hypot(*sampled.shape(inside)[1:]) == pytest.approx(1.0 / 1.09, rel=1e-3)
+    rough = plus_noise(3, 400)
+    at = bp.Sampled(rough)
+    assert np.abs(at.frames(at.stations)[0] - rough).max() < 1e-12
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
+def test_points_that_crowd(gap: float) -> None:
+    places = np.sort(np.append(np.linspace(0.0, 3.0, 15), 1.51 + gap * np.arange(4)))
+    sampled = bp.Sampled(helix(places))
+    assert sampled.length == pytest.approx(3.0 * np.hypot(1.0, 0.3), rel=1e-5)
+    assert np.abs(sampled.frames(sampled.stations)[0] - helix(places)).max() < 1e-13
+    inside = np.linspace(0.5, 2.5, 101)
+    assert np.hypot(*sampled.shape(inside)[1:]) == pytest.approx(1.0 / 1.09, rel=1e-2)
+
+
 def test_files(tmp_path: Path) -> None:
     points = plus_noise(11)
     np.save(tmp_path / "points.npy", points)

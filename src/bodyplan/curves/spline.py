@@ -70,7 +70,7 @@ class ArcLengthSpline:
         """The jet at s (N,), 0 <= s <= length; at a knot that of the piece behind it."""
         cell, u = self._parameter(s)
         span = self._span[cell]
-        x = (u - self._knots[span])[:, None]
+        x = u[:, None]
         a, b, c, d = (self._terms[k][span] for k in range(4))
         rate, second, third = c + x * (2.0 * b + 3.0 * x * a), 2.0 * b + 6.0 * x * a, 6.0 * a
         speed = np.linalg.norm(rate, axis=1, keepdims=True)
@@ -84,7 +84,7 @@ class ArcLengthSpline:
         return Jet(d + x * (c + x * (b + x * a)), _rolled(_moved(self._frames[cell], t), -roll), bend, slope)
 
     def _parameter(self, s: Array) -> tuple[IntArray, Array]:
-        """Cells (N,) and spline parameters (N,) of arc lengths s (N,), by Newton's method within the cell."""
+        """Cells (N,) and parameters (N,) in their spans of arc lengths s (N,), by Newton's method within the cell."""
         cell = np.clip(np.searchsorted(self._starts, s, side="right") - 1, 0, len(self._span) - 1)
         span, low = self._span[cell], self._low[cell]
         half = 0.5 * (self._high[cell] - low)
@@ -99,8 +99,8 @@ class ArcLengthSpline:
         return np.asarray(cell), np.asarray(low + half * (x + 1.0))
 
     def _rate(self, span: IntArray, u: Array) -> Array:
-        """dc/du (..., 3) at parameters u (...,) of the spans (...,)."""
-        x = (u - self._knots[span])[..., None]
+        """dc/du (..., 3) at parameters u (...,) from the starts of the spans (...,)."""
+        x = u[..., None]
         return np.asarray(self._terms[2][span] + x * (2.0 * self._terms[1][span] + 3.0 * x * self._terms[0][span]))
 
     def _cell_values(self, span: IntArray, low: Array, high: Array) -> tuple[Array, Array, Array]:
@@ -114,18 +114,23 @@ class ArcLengthSpline:
         speed = np.linalg.norm(rate, axis=-1)
         tangents = rate / np.where(speed > 0.0, speed, 1.0)[..., None]
         inner = tangents[:, 1:-1]
-        local = (u[:, 1:-1] - self._knots[span][:, None])[..., None]
+        local = u[:, 1:-1, None]
         second = 2.0 * self._terms[1][span][:, None] + 6.0 * local * self._terms[0][span][:, None]
         slopes = (second - _dot(inner, second) * inner) / np.where(speed > 0.0, speed, 1.0)[:, 1:-1, None]
         return speed[:, 1:-1], tangents, slopes
 
     def _cut(self) -> tuple[IntArray, Array, Array]:
-        """Spans, starts and ends (C,) of cells on which arc length and tangent are polynomials to rounding."""
+        """Spans, starts and ends (C,) of cells on which arc length and tangent are polynomials to rounding.
+
+        Parameters are counted from the start of their span: far along a curve, or where points crowd, those from its
+        beginning would have too few digits left for cells ever to be good.
+        """
         span = np.arange(len(self._knots) - 1)
-        low, high = self._knots[:-1], self._knots[1:]
+        sizes = np.diff(self._knots)
+        low, high = np.zeros(len(span)), sizes
         done: list[tuple[IntArray, Array, Array]] = []
         while len(span):
-            small = high - low < SMALLEST * (self._knots[span + 1] - self._knots[span])
+            small = high - low < SMALLEST * sizes[span]
             if small.any():
                 raise hairpin(int(span[small][0]), "has a cusp")
             middle = 0.5 * (low + high)
@@ -138,9 +143,9 @@ class ArcLengthSpline:
             kept = np.repeat(good, 2)
             done.append((twice[kept], first[kept], last[kept]))
             span, low, high = twice[~kept], first[~kept], last[~kept]
-        order = np.argsort(np.concatenate([start for _, start, _ in done]), kind="stable")
-        spans, lows, highs = (np.concatenate([part[k] for part in done])[order] for k in range(3))
-        return spans, lows, highs
+        spans, lows, highs = (np.concatenate([part[k] for part in done]) for k in range(3))
+        order = np.lexsort((lows, spans))
+        return spans[order], lows[order], highs[order]
 
     def _fields(self, span: IntArray, low: Array, high: Array) -> Array:
         """Speed and tangent (C, n, 4) at the nodes of cells."""
