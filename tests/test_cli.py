@@ -178,6 +178,8 @@ def test_check_and_its_exit_codes(finished, tmp_path):
         (["check", "concertina", "--set", "robot.mass=9**9**9**9 g"], ["robot.mass", "50 g"]),
         (["check", "concertina", "--set", "simulate.servo=[nan,1]"], ["simulate.servo"]),
         (["check", "concertina", "--set", "simulate.friction=-1"], ["simulate.friction =", "-1"]),
+        (["check", "serpentine", "--set", "simulate.friction.sideways=-1"], ["friction.sideways = -1", "equal to 0"]),
+        (["check", "serpantine"], ["neither a ready mission nor a file: unknown mission", "Did you mean 'serpentine'"]),
         (["check", "/"], ["folder"]),
         (["check", "x.npz", "--set", "a=1"], ["--set"]),
     ],

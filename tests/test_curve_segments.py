@@ -156,7 +156,7 @@ def test_any_pieces(parts: list) -> None:
 
 def test_straight_outside_and_the_value_behind_a_jump() -> None:
     curve = bp.Segments([(0.5, 1.0, 2.0, 3.0)])
-    assert np.array_equal(curve.shape([-1e-9, 0.0, 0.25, 0.5]).kappa_y, [0.0, 3.0, 3.0, 0.0])
+    assert np.array_equal(curve.shape([-1e-9, 0.0, 0.25, 0.5, 0.5 + 1e-9]).kappa_y, [0.0, 3.0, 3.0, 3.0, 0.0])
     assert np.array_equal(curve.breaks, [0.0, 0.5])
     assert np.abs(np.stack(curve.integral(-3.0, 7.0)) - [0.5, 1.0, 1.5]).max() < 1e-15
     inner = Constant(1.0, 2.0, 3.0)
@@ -192,6 +192,7 @@ def test_straight_outside_and_the_value_behind_a_jump() -> None:
         ([(-1.0, 2.0, 3.0, 3.0)], "length"),
         ([(1e20, 0.0, 0.0, 0.0), (1e-3, 0.0, 0.0, 1.0)], "too different"),
         ([None], r"pieces\[0\]"),
+        ([3.0], r"pieces\[0\]: a table with a kind, or \(length, tau, kappa_p, kappa_y\)"),
     ],
 )
 def test_refusals(given: object, text: str) -> None:

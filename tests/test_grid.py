@@ -237,7 +237,11 @@ def test_units_are_those_of_the_house():
         ('ours = "trial.speed_m_s"\n', 'ours = "speed"\n', ["speed", "plan.NAME", "A / B"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "trial.a / trial.b / trial.c"\n', ["A / B"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "trail.speed_m_s"\n', ["trail", "trial"]),
-        ('ours = "trial.speed_m_s"\n', 'ours = "concertina:trial.speed_m_s"\n', ["concertina", "compare"]),
+        (
+            'ours = "trial.speed_m_s"\n',
+            'ours = "concertina:trial.speed_m_s"\n',
+            ["not in compare: unknown mission 'concertina'"],
+        ),
         ('what = "gain"', 'wat = "gain"', ["wat", "what"]),
         ("printed = 1.36", "printed = nan", ["printed", "finite"]),
         ("printed = 1.36\n", "", ["printed", "missing"]),

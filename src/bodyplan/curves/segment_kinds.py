@@ -242,7 +242,7 @@ def segment_from(piece: Any, where: str) -> Segment:
     try:
         if isinstance(piece, Mapping):
             return _from_table(piece)
-        return Constants(*map(float, finite(piece, "constants", (4,))))
+        return Constants(*map(float, finite(piece, "a table with a kind, or (length, tau, kappa_p, kappa_y)", (4,))))
     except UnknownNameError as error:
         raise UnknownNameError(error.kind, error.name, error.valid, where) from error
     except InputError as error:

@@ -36,7 +36,7 @@ def load_curve(source: str, overrides: Sequence[str] = ()) -> tuple[str, BodyCur
     path = Path(source)
     suffix = path.suffix.lower()
     if suffix not in (*POINTS, ".toml"):
-        where = "a name, or a file ending in .csv, .npy or .toml;"
+        where = "neither a known name nor a file ending in .csv, .npy or .toml"
         raise UnknownNameError("curve", source, READY, where=where)
     if not path.is_file():
         raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}.")

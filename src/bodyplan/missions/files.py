@@ -62,7 +62,7 @@ def load_mission(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Mis
     if text in ready:
         return parse_mission(ready[text], text, f"mission {text}", None, overrides)
     if path.suffix != ".toml" and not path.exists():
-        raise UnknownNameError("mission", text, ready, where="no such file, and")
+        raise UnknownNameError("mission", text, ready, where="neither a ready mission nor a file")
     if path.is_dir():
         raise InputError(f"{text or '.'}: is a folder, not a mission file.")
     if not path.is_file():
@@ -220,7 +220,7 @@ class _Source:
             return model.model_validate(data)
         except ValidationError as error:
             # of a choice of types, the table's own errors say more than "not a number"
-            rank = {"extra_forbidden": 2, "missing": 1}
+            rank = {"extra_forbidden": 2, "missing": 1, "float_type": -1, "model_type": -1}
             first = max(error.errors(include_url=False), key=lambda e: rank.get(e["type"], 0))
             place = (*section, *_named(model, first["loc"]))
             field = ".".join(str(p) for p in place)

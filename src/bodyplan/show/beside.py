@@ -69,7 +69,7 @@ def check_row(ours: str, unit: str, mission: str, compared: Collection[str], cyc
     scale_of(unit)
     for metric in metrics_in(ours):
         if metric.mission not in (None, mission, *compared):
-            raise UnknownNameError("mission", metric.mission, compared, where=f"ours = {ours!r}: not in compare,")
+            raise UnknownNameError("mission", metric.mission, compared, where=f"ours = {ours!r}: not in compare")
         if metric.group == "trial" and metric.name not in (names := trial_names(cycles)):
             raise UnknownNameError("metric of the trial", metric.name, names, where=f"ours = {ours!r}")
 
