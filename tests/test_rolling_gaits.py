@@ -237,6 +237,11 @@ def test_round_trip(name):
 REFUSED = {
     "alpha_pitch: must not be 0": lambda: bp.Sidewinding(0.5, 0.0, 0.5),
     "alpha_yaw: must not be 0": lambda: bp.Sidewinding(0.0, 0.5, 0.5),
+    "alpha_yaw: must be within half a turn": lambda: bp.Sidewinding(1e300, 0.5, 0.5),
+    "alpha_pitch: must be within half a turn": lambda: bp.Sidewinding(0.5, -3.2, 0.5),
+    "curvature: must be at most": lambda: bp.Rolling(-1e300, 1.0),
+    "rate: must be at most": lambda: bp.Rolling(1.0, 1e300),
+    "twist: must be at most": lambda: bp.Rolling(1.0, 1.0, 1e300),
     "wavelength: ": lambda: bp.Sidewinding(0.5, 0.1, -0.5),
     "direction: must be 1": lambda: bp.Sidewinding(0.5, 0.1, 0.5, direction=0),
     "curvature: must not be 0": lambda: bp.Rolling(0.0, 1.0),

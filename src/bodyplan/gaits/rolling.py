@@ -25,6 +25,8 @@ from bodyplan.spatial.poses import IDENTITY
 
 AROUND = ("floor", "pole")
 AXES = ("x", "z")
+#: 1/m, rad/s: curvature, twist and rate beyond it are refused, their squares would overflow
+MOST = 1e6
 #: rad: parts of an arc whose direction differs less from its middle's roll without slip
 STRAIGHT = 0.35
 #: share of the surface speed that what touches may have (mean)
@@ -82,6 +84,9 @@ class Rolling(Gait):
             if value == 0.0:
                 raise InputError(f"{field}: must not be 0.")
         self.twist = number(twist, "twist")
+        for field, value in (("curvature", self.curvature), ("rate", self.rate), ("twist", self.twist)):
+            if abs(value) > MOST:
+                raise InputError(f"{field}: must be at most {MOST:g} either way, got {value!r}.")
         if around not in AROUND:
             raise UnknownNameError("around", around, AROUND)
         if axis not in AXES:

@@ -81,6 +81,8 @@ class Sidewinding(Gait):
         for field, value in (("alpha_yaw", self.alpha_yaw), ("alpha_pitch", self.alpha_pitch)):
             if value == 0.0:
                 raise InputError(f"{field}: must not be 0, sidewinding needs a wave in both planes.")
+            if abs(value) > np.pi:
+                raise InputError(f"{field}: must be within half a turn, 3.14159 rad, got {value:.6g} rad.")
         self.wavelength = number(wavelength, "wavelength", above=0.0)
         self.phase = number(phase, "phase")
         self.pace = Pace.of(speed, direction, start, 0.0, None)
