@@ -13,6 +13,7 @@ from bodyplan.cli import app
 from bodyplan.missions.curve_input import READY, load_curve
 from bodyplan.show.fit_outcome import FitOutcome, axes_of
 from bodyplan.show.fit_page import fit_page
+from bodyplan.show.fitted_plots import overlay
 
 FIT_FILES = {"fit.html", "fit.png", "fit.svg", "angles.csv", "fit.json"}
 
@@ -168,6 +169,16 @@ def test_the_page_says_the_numbers_and_loads_nothing(serpenoid):
     assert "default-src 'none'" in own and not re.search(r'(src|href)="(?!#)', own)
 
 
+def test_several_panels_name_their_axes_where_neighbours_leave_room():
+    """On a narrow screen a title beside the second panel would stand in the first."""
+    layout = overlay(FitOutcome.of("sinus-lift", load_curve("sinus-lift")[1], joints=5).drawn)["layout"]
+    names = [layout[f"xaxis{i}"]["title"]["text"] for i in ("", "2", "3")]
+    assert names == ["y over x (m)<br>from above", "z over x (m)<br>from the side", "z over y (m)<br>from the front"]
+    assert [key for key in ("yaxis", "yaxis2", "yaxis3") if "title" in layout[key]] == []
+    alone = overlay(FitOutcome.of("serpenoid", load_curve("serpenoid")[1], joints=5).drawn)["layout"]
+    assert (alone["xaxis"]["title"]["text"], alone["yaxis"]["title"]["text"]) == ("x (m)", "y (m)")
+
+
 def test_a_staircase_has_both_sides_of_every_step():
     outcome = FitOutcome.of("s", bp.Serpenoid(1.0), joints=5, joint="straight")
     drawn = outcome.drawn
@@ -205,7 +216,7 @@ def test_convergence_has_its_table_figure_and_orders(tmp_path):
 
 def test_joints_beyond_their_limits_fail_with_their_names(tmp_path):
     result = bodyplan("fit", "serpenoid", "--limit", "35 deg", "--out", str(tmp_path / "f"))
-    assert result.exit_code == 1 and "limit" in result.output
+    assert result.exit_code == 1 and "limit: joint 'yaw3' would be at 0.66877 rad" in result.output
     # at n = 10 two joints bend by 38.32 deg, the others by less than 32
     assert "yaw3 (by 3.32" in result.output and "yaw8 (by 3.32" in result.output and "yaw2 (" not in result.output
     within = bodyplan("fit", "serpenoid", "--limit", "35 deg", "--method", "optimal", "--out", str(tmp_path / "g"))
@@ -215,7 +226,9 @@ def test_joints_beyond_their_limits_fail_with_their_names(tmp_path):
 def test_a_curve_that_ends_is_a_status(tmp_path):
     np.save(tmp_path / "p.npy", helix_points())
     result = bodyplan("fit", str(tmp_path / "p.npy"), "--start", "50 mm", "--out", str(tmp_path / "f"))
-    assert result.exit_code == 1 and "curve_ended" in result.output
+    assert result.exit_code == 1 and re.search(
+        r"curve_ended: the robot takes 0\.05 \.\. \S+ m of a curve", result.output
+    )
 
 
 @pytest.mark.parametrize(
@@ -234,6 +247,9 @@ def test_a_curve_that_ends_is_a_status(tmp_path):
         (["serpenoid", "--end-link", "0.5", "--joint", "double"], ["end_link", "0.5"]),
         (["serpenoid", "--limit", "-1 deg"], ["limit"]),
         (["serpenoid", "--limit", "1 kg"], ["limit", "1 kg"]),
+        (["serpenoid", "--limit", "75"], ["limit: must be at most half a turn", "75 rad", "75 deg"]),
+        (["serpenoid", "--start", "1e300"], ["start: too far"]),
+        (["serpenoid", "--set", "alpha=1e8"], ["more than", "bends too much"]),
         (["serpenoid", "--start", "1 s"], ["start", "1 s", "length"]),
         (["serpenoid", "--start", "inf"], ["start"]),
         (["serpenoid", "--set", "alfa=1"], ["alfa", "alpha", "wavelength"]),
@@ -291,3 +307,4 @@ def test_help_shows_the_options():
     assert result.exit_code == 0
     for option in ("--joints", "--joint", "--end-link", "--method", "--start", "--convergence", "--limit"):
         assert option in result.output
+    assert "a .toml with a [curve]." in result.output  # not taken for markup

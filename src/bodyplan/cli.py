@@ -116,7 +116,8 @@ def export(
 @app.command()
 def fit(
     curve: Annotated[
-        str, typer.Argument(help="serpenoid, spiral, sinus-lift; points in a .csv or .npy; or a .toml with a [curve].")
+        str,
+        typer.Argument(help="serpenoid, spiral, sinus-lift; points in a .csv or .npy; or a .toml with a \\[curve]."),
     ],
     joints: Annotated[int, typer.Option(help="Joints that bend (of straight links: links).")] = 10,
     joint: Annotated[str, typer.Option(help="straight, arc or double.")] = "arc",
@@ -138,6 +139,7 @@ def fit(
     """Fit the joints of a snake to a body curve; print and draw how well they match."""
     with _bad_input():
         from bodyplan import job
+        from bodyplan.errors import SolveError
         from bodyplan.missions.curve_input import load_curve
         from bodyplan.show.fit_outcome import FitOutcome
         from bodyplan.show.fit_text import fit_text
@@ -165,7 +167,10 @@ def fit(
         _say(f"\n{outcome.title}", bold=True)
         typer.echo(fit_text(outcome))
         if not outcome.ok:
-            _say(f"\n  status     {outcome.fit.status}", fg=typer.colors.RED)
+            try:
+                outcome.fit.raise_if_failed()
+            except SolveError as error:
+                _say(f"\n  status     {error}", fg=typer.colors.RED)
         typer.echo(f"\n  written    {written}")
     raise typer.Exit(0 if outcome.ok else 1)
 

@@ -90,7 +90,8 @@ def dense_curve(curve: BodyCurve, low: float, high: float, body: float) -> Dense
         start, end, whole = first[~both], last[~both], halves[~both]
         cells += len(start)
         if cells > MAX_CELLS:
-            raise SolveError(Status.NOT_CONVERGED, f"more than {MAX_CELLS} cells along the curve")
+            reason = f"more than {MAX_CELLS} cells along the curve: it bends too much on the length of a body"
+            raise SolveError(Status.NOT_CONVERGED, reason)
     starts, steps, shapes = (np.concatenate(parts) for parts in zip(*done, strict=True))
     order = np.argsort(starts, kind="stable")
     at = np.append(starts[order], high)
@@ -112,9 +113,10 @@ def _steps(curve: BodyCurve, start: Array, end: Array) -> Array:
 def _bends_at_ends(curve: BodyCurve, edges: Array, breaks: Array) -> Array:
     """(kappa_p, kappa_y) at both ends of the half cells between ``edges`` (M, 3): (2 M, 2, 2)."""
     places = edges.copy()
-    # at the end of a cell the value before a jump counts
-    at_break = np.isin(edges[:, 2], breaks)
-    places[at_break, 2] = np.nextafter(edges[at_break, 2], -np.inf)
+    # at a jump the value within the cell counts
+    for side, inward in ((0, np.inf), (2, -np.inf)):
+        at_break = np.isin(edges[:, side], breaks)
+        places[at_break, side] = np.nextafter(edges[at_break, side], inward)
     shape = curve.shape(places)
     bends = np.stack([shape[1], shape[2]], axis=-1)
     return np.ascontiguousarray(np.stack([bends[:, :2], bends[:, 1:]], axis=1).reshape(-1, 2, 2))

@@ -25,6 +25,8 @@ from bodyplan.spatial import compose, quaternion_from_matrix
 METHODS = ("paper", "optimal")
 #: m that a robot may stick out of a curve that ends
 BEYOND = 1e-9
+#: share of the body that rounding of the places on the curve may be
+FARTHEST = 1e-6
 #: rad: a joint that is so near its limit is at it
 AT_LIMIT = 1e-9
 
@@ -311,6 +313,9 @@ def fit(
     begin = np.array(finite(start, "start"))
     begin.flags.writeable = False
     angles = rule(robot, p)
+    length = angles.mechanism.length
+    if begin.size and np.spacing(np.abs(begin).max()) > FARTHEST * length:
+        raise InputError(f"start: too far for a body of {length:.6g} m to be told from a point, got {start!r}.")
     bends = [angles.evaluate(each, begin, 0) for each in curves]
     q, kink = np.array([b.q for b in bends]), np.array([b.kink for b in bends])
     fine = np.ones((len(curves), begin.size), dtype=bool)

@@ -81,8 +81,9 @@ class FitOutcome:
             raise UnknownNameError("joint", joint, KINDS)
         if method not in RULES:
             raise UnknownNameError("method", method, RULES)
-        if limit is not None:
-            number(limit, "limit", above=0.0)
+        if limit is not None and number(limit, "limit", above=0.0) > np.pi:
+            said = f"limit: must be at most half a turn, 3.14159 rad, got {limit:.6g} rad"
+            raise InputError(f'{said}; degrees need "deg", as in "75 deg".')
         flat = axes_of(curve) if axes is None else axes
 
         def fitted(kind: str, rule: str) -> Fit:

@@ -18,7 +18,9 @@ def overlay(drawn: Drawn) -> dict[str, Any]:
     views = drawn.views
     data: list[dict[str, Any]] = []
     made = layout("", "", 430 if len(views) == 1 else 330)
-    width = (1.0 - 0.09 * (len(views) - 1)) / len(views)
+    # room for the labels between the panels on a narrow screen too
+    gap = 0.14
+    width = (1.0 - gap * (len(views) - 1)) / len(views)
     for i, view in enumerate(views):
         a, b = VIEWS[view]
         suffix = "" if i == 0 else str(i + 1)
@@ -28,17 +30,20 @@ def overlay(drawn: Drawn) -> dict[str, Any]:
         marker = {"color": MECHANISM, "size": 6, "line": {"color": "#fff", "width": 1}}
         joints = drawn.joints
         data.append(line(joints[:, a], joints[:, b], "joints", MECHANISM, mode="markers", marker=marker, **axes))
-        left = i * (width + 0.09)
+        left = i * (width + gap)
+        across, up = f"{'xyz'[a]} (m)", f"{'xyz'[b]} (m)"
+        # several panels name both axes below, where they have room
+        below = {"text": f"{'xyz'[b]} over {across}<br>from {view}", "font": {"size": 12}}
         made[f"xaxis{suffix}"] = {
             **AXIS,
-            "title": {"text": f"{'xyz'[a]} (m), from {view}" if len(views) > 1 else f"{'xyz'[a]} (m)"},
+            "title": below if len(views) > 1 else {"text": across},
             "domain": [left, left + width],
             "anchor": f"y{suffix}",
             "nticks": 6,
         }
         made[f"yaxis{suffix}"] = {
             **AXIS,
-            "title": {"text": f"{'xyz'[b]} (m)", "standoff": 4},
+            **({} if len(views) > 1 else {"title": {"text": up, "standoff": 4}}),
             "anchor": f"x{suffix}",
             "scaleanchor": f"x{suffix}",
             "scaleratio": 1,
