@@ -64,7 +64,8 @@ def followed(curve: bc.BodyCurve, end: float) -> tuple[np.ndarray, np.ndarray]:
     """Point (3,) and rotation (3, 3) at s = ``end`` from the identity at s = 0: eq. (1) by DOP853, row by row."""
 
     def rates(s: float, y: np.ndarray, low: float, high: float) -> np.ndarray:
-        inside = min(max(s, low), np.nextafter(high, low))  # the value before a jump at the end of a piece
+        # within the piece: at a jump one of two values counts
+        inside = min(max(s, np.nextafter(low, high)), np.nextafter(high, low))
         tau, kappa_p, kappa_y = (float(v) for v in curve.shape(inside))
         e_r, e_p, e_y = y[3:6], y[6:9], y[9:12]
         return np.concatenate(

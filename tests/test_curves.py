@@ -10,8 +10,8 @@ import pytest
 import bodyplan as bp
 from bodyplan import curves as bc
 from bodyplan.curves.quadrature import shape_integral
-from bodyplan.spatial import compose, exp, matrix_from_quaternion
-from curve_cases import CURVES, followed, integrated
+from bodyplan.spatial import compose, curve_frames, exp, matrix_from_quaternion
+from curve_cases import CURVES, SAMPLED, SEGMENTS, followed, integrated
 
 EVERY = pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES.keys())
 PLACES = np.array([0.83, -0.4, 0.0, 1.7, 0.31, 0.83])
@@ -104,9 +104,11 @@ def test_breaks_are_all_the_jumps(curve: bc.BodyCurve) -> None:
     breaks = curve.breaks
     assert np.all(np.diff(breaks) > 0.0)
     assert not breaks.flags.writeable
-    # the value behind, also right at the jump
-    at, behind = np.stack(curve.shape(breaks)), np.stack(curve.shape(breaks + 1e-12))
-    assert np.abs(at - behind).max(initial=0.0) < 1e-9
+    # the value behind, also right at the jump; where a curve of pieces ends, the value in it
+    at = np.stack(curve.shape(breaks))
+    before, behind = (np.stack(curve.shape(breaks + side)) for side in (-1e-12, 1e-12))
+    ends = np.isin(breaks, [SEGMENTS.length, SAMPLED.length])
+    assert np.abs(at - np.where(ends, before, behind)).max(initial=0.0) < 1e-9
     s = np.linspace(-0.4, 1.6, 2001)
     near = np.any((s[:-1, None] < breaks) & (breaks <= s[1:, None]), axis=1)
     steps = np.abs(np.diff(np.stack(curve.shape(s)), axis=1)).max(axis=0)
@@ -208,3 +210,40 @@ def test_a_curve_cannot_be_changed() -> None:
     with pytest.raises(AttributeError, match="make a new one"):
         curve.alpha = 2.0
     assert curve.alpha == 1.0
+
+
+@pytest.mark.parametrize(
+    "curve",
+    [
+        bp.Serpenoid(1.1, 0.1),
+        bp.SinusLift(1.3, 0.3, 0.1),
+        bp.SinusLift(1.3, 0.3, 0.1, c1=0.02),
+        bp.Serpenoid(0.8, 0.1, phase=0.4)
+        + bp.Serpenoid(0.3, 0.1, phase=1.5, plane="pitch")
+        + bc.Constant(0.5, 0.0, 1.0),
+    ],
+)
+def test_far_along_a_periodic_curve(curve: bc.BodyCurve) -> None:
+    # the same as going there step by step, ahead and back
+    s = np.array([6.43, 6.2, -6.77, 0.03])
+    near = curve.frames(s[3:])
+    points, rotations = curve.frames(s)
+    assert np.array_equal(points[3], near[0][0]) or np.abs(points[3] - near[0][0]).max() < 1e-14
+    stepped, turned = curve_frames(lambda x: np.stack(curve.shape(x), axis=-1), [0.0, 6.2, 6.43], tolerance=1e-12)
+    assert np.abs(points[[1, 0]] - stepped[1:]).max() < 1e-10
+    assert np.abs(rotations[[1, 0]] - turned[1:]).max() < 1e-10
+    back = curve.frames([-6.77, 0.0], np.array([0.3, 0.1, 0.2, 1.0, 0.0, 0.0, 0.0]))[0]
+    assert np.abs(back[0] - points[2] - [0.3, 0.1, 0.2]).max() < 1e-12
+    # and ten thousand periods on, a period is still the same screw
+    there, turn = curve.frames([1000.0, 1000.1, 1000.2])
+    first, second = (turn[i].T @ (there[i + 1] - there[i]) for i in (0, 1))
+    assert np.abs(first - second).max() < 1e-9
+    assert np.abs(turn[0].T @ turn[1] - turn[1].T @ turn[2]).max() < 1e-9
+
+
+def test_the_end_of_a_curve_is_in_it() -> None:
+    pieces = bp.Segments([{"kind": "line", "length": 0.2}, {"kind": "arc", "length": 0.3, "curvature": 4.0}])
+    assert pieces.shape(pieces.length).kappa_y == 4.0
+    assert pieces.shape(np.nextafter(pieces.length, 1.0)).kappa_y == 0.0
+    sampled = bp.Sampled(pieces.frames(np.linspace(0.21, 0.5, 40))[0])
+    assert abs(sampled.shape(sampled.length).kappa_y - 4.0) < 0.01

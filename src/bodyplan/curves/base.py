@@ -21,6 +21,10 @@ from bodyplan.spatial.frames import curve_frames
 from bodyplan.spatial.poses import IDENTITY
 
 
+#: periods from s = 0 beyond which whole ones are not integrated again
+FAR = 64.0
+
+
 class Shape(NamedTuple):
     """Turns about e_r, e_p, e_y: rad per m (shape functions), rad (their integrals) or rad per m^2 (their slopes)."""
 
@@ -56,7 +60,8 @@ class BodyCurve(ABC):
 
     @abstractmethod
     def shape(self, s: ArrayLike) -> Shape:
-        """(tau, kappa_p, kappa_y) at s (...,) m, each (...,) rad/m; at a jump the value behind it (larger s)."""
+        """(tau, kappa_p, kappa_y) at s (...,) m, each (...,) rad/m; at a jump the value behind it (larger s), at the
+        end of a curve that ends the value in it."""
 
     @abstractmethod
     def slope(self, s: ArrayLike) -> Shape:
@@ -104,6 +109,8 @@ class BodyCurve(ABC):
             raise InputError("s: needs at least one value.")
         number(tolerance, "tolerance", at_least=1e-13)
         exact = self._poses(at)
+        if exact is None and self.period and np.abs(at).max() > FAR * self.period:
+            exact = self._far_poses(at, self.period, tolerance)
         if exact is not None:
             poses = compose(begin, exact)
             return poses[:, :3], matrix_from_quaternion(poses[:, 3:])
@@ -125,6 +132,26 @@ class BodyCurve(ABC):
     def _poses(self, s: Array) -> Array | None:
         """Poses (S, 7) at s (S,) seen from the frame at s = 0, for a curve that knows them exactly."""
         return None
+
+    def _far_poses(self, s: Array, period: float, tolerance: float) -> Array:
+        """Poses (S, 7) at s (S,) of a periodic curve: whole periods are powers of the screw of one, the rest is
+        integrated."""
+        turns = np.floor(s / period)
+        most = float(np.abs(turns).max())
+        # the error of the screw grows with its power
+        points, rotations = self.frames([period], IDENTITY, tolerance=max(1e-13, tolerance / most))
+        screw = np.concatenate([points[0], quaternion_from_matrix(rotations[0])])
+        counts, which = np.unique(turns, return_inverse=True)
+        whole = np.tile(np.asarray(IDENTITY), (len(counts), 1))
+        left = np.abs(counts).astype(np.int64)
+        while left.any():
+            odd = left % 2 == 1
+            whole[odd] = compose(screw, whole[odd])
+            screw, left = compose(screw, screw), left // 2
+        whole[counts < 0] = inverse(whole[counts < 0])
+        points, rotations = self.frames(s - turns * period, IDENTITY, tolerance=tolerance)
+        within = np.concatenate([points, quaternion_from_matrix(rotations)], axis=-1)
+        return compose(whole[which], within)
 
     def untwisted(self) -> BodyCurve:
         """The same points with a frame that does not roll (tau = 0): what joints that only bend can follow."""

@@ -95,7 +95,7 @@ class Sampled(BodyCurve):
         at = finite(s, "s")
         flat = at.ravel()
         out = np.zeros((2, len(flat)))
-        inside = np.flatnonzero((flat >= 0.0) & (flat < self.length))
+        inside = np.flatnonzero((flat >= 0.0) & (flat <= self.length))
         for i in range(0, len(inside), CHUNK):
             some = inside[i : i + CHUNK]
             jet = self._spline.at(flat[some])

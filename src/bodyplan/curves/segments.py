@@ -99,7 +99,8 @@ class Segments(BodyCurve):
 
     def _piece(self, s: Array) -> tuple[IntArray, Array]:
         """Rows of places s, and the places from the start of their piece."""
-        row = np.searchsorted(self._breaks, s, side="right")
+        # the end belongs to the last piece
+        row = np.searchsorted(self._breaks, s, side="right") - (s == self._breaks[-1])
         return np.asarray(row), np.asarray(s - self._origins[row])
 
     def _within(self, i: IntArray, x: Array, y: Array) -> Shape:

@@ -122,8 +122,8 @@ def _adaptive(shape: Callable[[Array], ArrayLike], s: Array, length: float, tole
         middle = np.where(low < middle, middle, high)
         starts, ends = np.stack([low, middle], 1), np.stack([middle, high], 1)
         # a jump of the shape nearer to an end than the outermost node shows only at the end
-        # (at the end of a step the value before it: a jump exactly there belongs to the next step)
-        outer = np.concatenate([low, np.nextafter(high, low)])
+        # (the values just within the step: a jump exactly at an end belongs to a neighbour)
+        outer = np.concatenate([np.nextafter(low, high), np.nextafter(high, low)])
         halves, u, at_ends = _displacements(shape, starts.ravel(), ends.ravel(), outer)
         error = np.empty(len(low))
         differences(whole, halves, u, at_ends, high - low, 1.0 + length, error)
