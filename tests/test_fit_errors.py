@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import bodyplan as bp
-from bodyplan.curves import Constant, Sampled, Segments
+from bodyplan.curves import Constant, Sampled, Segments, Transition
 from bodyplan.fitting import GAUSS_P, convergence, rule
 from bodyplan.fitting.convergence import robot_of
 from fit_cases import arc_chain, arc_rule, bend, curve_path, double_chain, mean_distance, straight_chain
@@ -300,6 +300,8 @@ def test_a_curve_that_ends():
     assert found.error[0, 4] < 1e-13 and np.all(np.abs(found.q[0, 4]) < 1e-14)
     assert bp.fit(pieces + Constant(kappa_y=1.0), arcs(5), start=0.3).status == "ok"
     assert bp.fit(pieces + pieces, arcs(5), start=0.3).status == "curve_ended"
+    going_over = Transition(pieces, pieces, 0.2, 0.1)
+    assert bp.fit(going_over, arcs(5), start=0.3).status == "curve_ended"
 
 
 def test_joint_limits_are_reported_and_not_applied():
@@ -402,3 +404,8 @@ def test_bad_arguments():
     for s in ([1.1], [-0.1], [[0.5]], ["x"]):
         with pytest.raises(bp.InputError, match="s"):
             bp.fit(SPIRAL, robot).points(s)
+
+
+def test_no_start_is_refused():
+    with pytest.raises(bp.InputError, match="start"):
+        bp.fit(SERPENOID, arcs(5), start=[])

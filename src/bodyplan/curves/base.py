@@ -87,6 +87,11 @@ class BodyCurve(ABC):
         return None
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """(first, last) arc length m that the curve describes; infinite for a formula, else straight beyond."""
+        return -np.inf, np.inf
+
+    @property
     def twisted(self) -> bool:
         """True where tau is not 0 everywhere."""
         return False

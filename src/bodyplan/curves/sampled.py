@@ -78,6 +78,11 @@ class Sampled(BodyCurve):
         return self._start
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """See :attr:`BodyCurve.extent`."""
+        return 0.0, self.length
+
+    @property
     def breaks(self) -> Array:
         """The stations: the slopes jump there."""
         return self.stations

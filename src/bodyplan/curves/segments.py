@@ -59,6 +59,11 @@ class Segments(BodyCurve):
         return {"kind": self.kind, "pieces": [piece.to_dict() for piece in self.pieces]}
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """See :attr:`BodyCurve.extent`."""
+        return 0.0, self.length
+
+    @property
     def breaks(self) -> Array:
         """Where pieces meet, and both ends, m."""
         return self._breaks

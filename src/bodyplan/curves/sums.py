@@ -51,6 +51,12 @@ class Sum(BodyCurve):
         """See :attr:`BodyCurve.start`."""
         return self.parts[0].start
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """See :attr:`BodyCurve.extent`: a sum goes on as long as one of its parts does."""
+        spans = [part.extent for part in self.parts]
+        return min(low for low, _ in spans), max(high for _, high in spans)
+
     @cached_property
     def breaks(self) -> Array:
         """See :attr:`BodyCurve.breaks`."""

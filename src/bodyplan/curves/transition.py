@@ -72,6 +72,11 @@ class Transition(BodyCurve):
         return self.before.start
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """See :attr:`BodyCurve.extent`."""
+        return self.before.extent[0], self.after.extent[1]
+
+    @property
     def breaks(self) -> Array:
         """See :attr:`BodyCurve.breaks`; both ends of the transition, where the third slope jumps."""
         return self._breaks

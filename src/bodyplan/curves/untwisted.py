@@ -41,6 +41,11 @@ class Untwisted(BodyCurve):
         return self.curve.start
 
     @property
+    def extent(self) -> tuple[float, float]:
+        """See :attr:`BodyCurve.extent`."""
+        return self.curve.extent
+
+    @property
     def breaks(self) -> Array:
         """See :attr:`BodyCurve.breaks`."""
         return self.curve.breaks

@@ -13,7 +13,6 @@ from bodyplan.arrays import Array, BoolArray, TextArray, finite
 from bodyplan.curves.base import BodyCurve
 from bodyplan.errors import InputError, SolveError, Status, UnknownNameError
 from bodyplan.fitting.angles import JointAngles
-from bodyplan.fitting.extent import extent
 from bodyplan.fitting.following import Following, body_points, followings
 from bodyplan.fitting.mechanism import PITCH, YAW, Mechanism, mechanism
 from bodyplan.fitting.optimal import EXACT, optimal
@@ -237,7 +236,7 @@ class Fit:
         out[np.any(self._excess > AT_LIMIT, axis=-1)] = Status.LIMIT.value
         starts = self.start.ravel()
         for c, curve in enumerate(self._given):
-            low, high = extent(curve)
+            low, high = curve.extent
             out[c, (starts < low - BEYOND) | (starts + self.length > high + BEYOND)] = Status.CURVE_ENDED.value
         return out
 
@@ -311,10 +310,12 @@ def fit(
     many = not isinstance(curve, BodyCurve)
     curves = _curves(curve)
     begin = np.array(finite(start, "start"))
+    if not begin.size:
+        raise InputError("start: needs at least one value.")
     begin.flags.writeable = False
     angles = rule(robot, p)
     length = angles.mechanism.length
-    if begin.size and np.spacing(np.abs(begin).max()) > FARTHEST * length:
+    if np.spacing(np.abs(begin).max()) > FARTHEST * length:
         raise InputError(f"start: too far for a body of {length:.6g} m to be told from a point, got {start!r}.")
     bends = [angles.evaluate(each, begin, 0) for each in curves]
     q, kink = np.array([b.q for b in bends]), np.array([b.kink for b in bends])
