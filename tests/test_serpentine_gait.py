@@ -211,6 +211,27 @@ def test_mean_frame_moves_evenly(name):
     assert np.ptp(swing) > 1.0 and np.abs(other.base[-1, :2] - motion.base[-1, :2]).max() < 0.2
 
 
+@pytest.mark.parametrize("robot", list(ROBOTS))
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("steer", [0.0, 0.8])
+def test_a_flat_chassis_stays_flat(robot, direction, steer):
+    """Whichever way frames lie in their bodies: those of two-axis double joints lie on their side."""
+    gait = bp.Serpentine(bp.Serpenoid(1.0, 0.6), 0.2, direction, steer, base="chassis", start=0.1)
+    motion = planned(gait, ROBOTS[robot], samples=60)
+    assert np.ptp(motion.base[:, 2]) < 1e-12
+    np.testing.assert_allclose(motion.poses().rotations[:, 0, 2], np.broadcast_to([0, 0, 1], (61, 3)), atol=1e-12)
+    report = bp.check(motion)
+    assert report.ok, str(report)
+
+
+def test_the_mean_frame_of_a_straight_body_is_that_of_its_base():
+    rng = np.random.default_rng(5)
+    for robot in ROBOTS.values():
+        rest, turned = mean_frames(robot, np.array([np.zeros(robot.n), rng.normal(size=robot.n)]))
+        np.testing.assert_allclose(rest[3:], [1, 0, 0, 0], atol=1e-14)
+        assert np.abs(turned[3:] - rest[3:]).max() > 1e-3
+
+
 def test_mean_rotation_and_parts_of_a_screw():
     rng = np.random.default_rng(3)
     R = rotation_exp(rng.normal(size=(7, 3)))

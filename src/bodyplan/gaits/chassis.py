@@ -12,8 +12,9 @@ from bodyplan.spatial import left_jacobian, matrix_from_quaternion, quaternion_f
 def mean_frames(robot: Robot, q: Array) -> Array:
     """Poses (T, 7) of the mean body frame seen from the base, for q (T, n).
 
-    Its origin is the centre of mass, its rotation the chordal mean of the bodies' rotations weighted by mass (the
-    rotation nearest to the weighted sum of their matrices). A robot without masses counts every frame once.
+    Its origin is the centre of mass, its rotation the chordal mean of the bodies' rotations since q = 0 weighted by
+    mass (the rotation nearest to the weighted sum of their matrices): how a frame lies in its body does not count. A
+    robot without masses counts every frame once.
     """
     poses = robot.forward(q)
     bodies = [robot.base_body, *(element.body for element in robot.elements)]
@@ -25,9 +26,9 @@ def mean_frames(robot: Robot, q: Array) -> Array:
     weights = mass[used] / mass.sum()
     rotations = matrix_from_quaternion(poses.array[:, used, 3:])
     points = poses.positions[:, used] + np.einsum("tfij,fj->tfi", rotations, middle[used])
-    return np.concatenate(
-        [np.einsum("tfi,f->ti", points, weights), mean_rotation(np.einsum("tfij,f->tij", rotations, weights))], axis=-1
-    )
+    rest = robot.forward(np.zeros(robot.n)).rotations[used]
+    turned = np.einsum("tfij,fkj,f->tik", rotations, rest, weights)
+    return np.concatenate([np.einsum("tfi,f->ti", points, weights), mean_rotation(turned)], axis=-1)
 
 
 def mean_pose(poses: Array) -> Array:
