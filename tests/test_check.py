@@ -67,6 +67,7 @@ SPOILED = {
     "one joint too large": ({"q": stretched}, {"on_curve", "at_rest"}),
     "one sample off": ({"q": one_sample}, {"on_curve"}),
     "rates of another motion": ({"qd": lambda qd: np.multiply(qd, 1.3, out=qd)}, {"rates"}),
+    "rates a twentieth too large": ({"qd": lambda qd: np.multiply(qd, 1.05, out=qd)}, {"rates"}),
     "rates with the wrong sign": ({"qd": lambda qd: np.negative(qd, out=qd)}, {"rates"}),
     "noise on the rates": ({"qd": lambda qd: np.add(qd, 20.0 * (-1.0) ** np.arange(501)[:, None], out=qd)}, {"rates"}),
     "no rates": ({"qd": lambda qd: qd.fill(0.0), "qdd": lambda qdd: qdd.fill(1e6)}, {"rates"}),

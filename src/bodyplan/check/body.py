@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bodyplan.arrays import Array, IntArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.check.claims import allowance
 from bodyplan.check.report import Line
 from bodyplan.errors import Status
@@ -16,6 +16,8 @@ from bodyplan.robot.neighbours import separate_contacts
 RATE_SLACK, ACCELERATION_SLACK = 0.15, 0.25
 #: how many times the largest difference quotient a rate may be: rates may peak between two samples
 PEAK = 20.0
+#: quotients run smoothly where their second differences are below this share of them; then rates may be off by FINE
+SMOOTH, FINE = 0.05, 0.01
 #: fewer samples than this cannot tell a wrong rate from one that changes between them
 FEW = 50
 #: slack of lengths and limits
@@ -43,7 +45,8 @@ def rates_agree(motion: Motion) -> list[Line]:
 
     A derivative at a sample must lie between the difference quotients on both sides of it, give or take how much those
     change nearby and a tenth. Jumps are honest, so single samples may lie outside: the value is the share of a joint's
-    moving samples that do, of the worst joint; and no derivative may be PEAK times the largest quotient.
+    moving samples that do, of the worst joint; and no derivative may be PEAK times the largest quotient. Where even
+    samples run smoothly it must also agree with the five-point formula, see :func:`_off_where_smooth`.
     """
     out = []
     pairs = (("rates agree with positions", motion.q, motion.qd, RATE_SLACK, PEAK),
@@ -62,6 +65,7 @@ def rates_agree(motion: Motion) -> list[Line]:
         room = nearby + 0.1 * size
         off = (claimed < np.minimum(before, after) - room) | (claimed > np.maximum(before, after) + room)
         largest = float(size.max(initial=0.0))
+        off |= _off_where_smooth(motion.t, quotient, claimed)
         moving = (size > 1e-3 * largest) | (np.abs(claimed) > 1e-3 * largest + EXACT)
         share = (off & moving).sum(axis=0) / np.maximum(moving.sum(axis=0), 20)
         joint = int(share.argmax())
@@ -69,6 +73,24 @@ def rates_agree(motion: Motion) -> list[Line]:
         detail = "a rate is far beyond all others" if wild else f"worst: {motion.joints[joint]}"
         out.append(Line(what, value, slack, "", value <= slack and not wild, detail, kind="rates"))
     return out
+
+
+def _off_where_smooth(t: Array, quotient: Array, claimed: Array) -> BoolArray:
+    """(T, n) True where the difference quotients (T - 1, n) of even samples run smoothly around a sample and the
+    derivative claimed there misses the five-point formula by more than FINE and three times what that differs from the
+    three-point one."""
+    off = np.zeros(claimed.shape, dtype=bool)
+    if np.ptp(np.diff(t)) > 1e-6 * float(np.diff(t).mean()):
+        return off
+    before, after = quotient[1:-2], quotient[2:-1]
+    three = 0.5 * (before + after)
+    five = (7.0 * (before + after) - (quotient[:-3] + quotient[3:])) / 12.0
+    size = np.maximum(np.abs(before), np.abs(after))
+    bend = np.abs(np.diff(quotient, 2, axis=0))
+    smooth = np.maximum(bend[:-1], bend[1:]) <= SMOOTH * size
+    missed = np.abs(claimed[2:-2] - five) > FINE * size + 3.0 * np.abs(five - three)
+    off[2:-2] = smooth & missed
+    return off
 
 
 def joint_limits(motion: Motion) -> list[Line]:

@@ -20,7 +20,6 @@ from bodyplan.spatial import compose, inverse, matrix_from_quaternion, quaternio
 from bodyplan.spatial.frames import curve_frames
 from bodyplan.spatial.poses import IDENTITY
 
-
 #: periods from s = 0 beyond which whole ones are not integrated again
 FAR = 64.0
 
