@@ -187,6 +187,42 @@ def test_changes_do_not_jump(name):
     np.testing.assert_allclose(bp.plan(ACM, gait, bp.Plane(), np.array([0.0, 0.4])).q, first.q, atol=1e-12)
 
 
+BEFORE_THE_BODY = {
+    "steer": {"steer": [(0.0, 2.0), (0.6, -1.0)]},
+    "lift": {"changes": [(0.0, bp.SinusLift(1.2, 0.2, 0.6))]},
+    "spiral": {"changes": [(0.5, SPIRAL)], "steer": 0.4, "change_length": 0.2},
+    "all": {"changes": [(0.2, LIFTED), (0.5, SPIRAL)], "steer": [(0.1, 0.5)], "ramp": 0.4},
+}
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("start", [-3.0, -0.4, 0.0, 0.5, 3.0])
+@pytest.mark.parametrize("name", list(BEFORE_THE_BODY))
+def test_begins_level_at_the_origin_whatever_the_curve_does_elsewhere(name, start, direction):
+    """The body begins where it would without the changes to come, which may lie between it and s = 0."""
+    options = dict(BEFORE_THE_BODY[name])
+    gait = bp.Serpentine(bp.Serpenoid(1.0, 0.6), 0.2, direction, start=start, **options)
+    steer = options.get("steer", [])
+    plain = bp.Serpentine(
+        bp.Serpenoid(1.0, 0.6), 0.2, direction, steer if isinstance(steer, float) else 0.0, start=start
+    )
+    t = np.linspace(0.0, 2.0, 41)
+    motion, other = bp.plan(ACM, gait, bp.Plane(), t), bp.plan(ACM, plain, bp.Plane(), t)
+    np.testing.assert_allclose(motion.q[0], other.q[0], atol=1e-11)
+    np.testing.assert_allclose(motion.base[0, :2], 0.0, atol=1e-11)
+    np.testing.assert_allclose(motion.base[0, 3:], other.base[0, 3:], atol=1e-11)
+    assert bp.check(motion).ok
+    # the stretch under the body at the start goes along +x, level
+    pose = np.asarray(next(claim for claim in motion.claims if claim.kind == "follows").data["pose"])
+    points, frames = gait.course(ACM).frames(np.array([start, start + 0.6]), pose)
+    np.testing.assert_allclose(points[0, :2], 0.0, atol=1e-9)
+    np.testing.assert_allclose((points[1] - points[0])[1:], 0.0, atol=1e-9)
+    np.testing.assert_allclose(frames[:, :, 2], [[0, 0, 1], [0, 0, 1]], atol=1e-9)
+    assert points[1, 0] - points[0, 0] == pytest.approx(
+        0.6 * j0(1.0), rel=1e-9 if not isinstance(steer, float) else 0.1
+    )
+
+
 def test_after_a_change_the_body_is_on_the_next_curve():
     gait = bp.Serpentine(WAVE, 0.16, changes=[(1.0, LIFTED)])
     t = np.array([0.0, 12.0, 13.0])  # the head went over within a wavelength, the tail 0.7 m later
@@ -335,6 +371,22 @@ def test_constant_and_aperiodic_curves():
     np.testing.assert_allclose(motion.q[0], 0.0, atol=1e-14)
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_steering_before_the_body_moves_takes_the_later_value(direction):
+    """1e-5 s into the ramp the body has moved by less than rounding."""
+    options = {"direction": direction, "ramp": 1.0, "stop": 4.0}
+    t = np.linspace(0.0, 5.0, 51)
+    twice, once = (
+        bp.plan(ACM, bp.Serpentine(WAVE, 0.16, steer=steer, **options), bp.Plane(), t)
+        for steer in (
+            [(0.0, 3.0), (1e-5, 0.5), (3.0, 0.2), (4.0 - 1e-5, 2.0), (4.0 - 1e-6, 1.0)],
+            [(0.0, 0.5), (3.0, 0.2)],
+        )
+    )
+    np.testing.assert_allclose(twice.q, once.q, atol=1e-11)
+    np.testing.assert_allclose(twice.base, once.base, atol=1e-11)
+
+
 def test_beyond_a_joint_limit_is_a_status():
     robot = bp.snake(12, 0.06, "arc", axes="universal", limits=(-0.4, 0.4))
     motion = planned(bp.Serpentine(WAVE, 0.16), robot)
@@ -353,6 +405,8 @@ REFUSED = {
     "ramp: ": lambda: bp.Serpentine(WAVE, ramp=-1.0),
     "steer: times must increase": lambda: bp.Serpentine(WAVE, steer=[(2.0, 0.1), (1.0, 0.2)]),
     "steer: expected pairs": lambda: bp.Serpentine(WAVE, steer=[1.0, 2.0]),
+    "steer: times must be < stop": lambda: bp.Serpentine(WAVE, ramp=1.0, stop=4.0, steer=[(1.0, 0.1), (5.0, 0.2)]),
+    "changes: times must be < stop": lambda: bp.Serpentine(WAVE, ramp=1.0, stop=4.0, changes=[(4.0, LIFTED)]),
     "changes: times must be >= 0": lambda: bp.Serpentine(WAVE, changes=[(-1.0, WAVE)]),
     "changes: at most 10": lambda: bp.Serpentine(WAVE, changes=[(k, WAVE) for k in range(11)]),
     "base: 'chassis' needs": lambda: bp.Serpentine(WAVE, base="chassis", changes=[(1.0, LIFTED)]),

@@ -45,6 +45,12 @@ def body_curve(curve: Any, field: str) -> BodyCurve:
     raise InputError(f"{field}: expected a body curve or a table with its kind, got {curve!r}.")
 
 
+def frames_of(curve: BodyCurve, s: Array) -> Array:
+    """Poses (T, 7) of a curve's frames at s (T,) m, seen from its frame at s = 0."""
+    points, rotations = curve.frames(s, IDENTITY, tolerance=TOLERANCE)
+    return np.concatenate([points, quaternion_from_matrix(rotations)], axis=-1)
+
+
 @dataclass(frozen=True)
 class Joints:
     """q, dq/dt, d2q/dt2 (T, n) and the base seen from the curve's frame at the tail, quaternions ``kink`` (T, 4)."""
@@ -89,8 +95,7 @@ class Following:
 
     def poses(self, s: Array) -> Array:
         """Poses (T, 7) of the curve's frames at s (T,) m, seen from its frame at s = 0."""
-        points, rotations = self.curve.frames(s, IDENTITY, tolerance=TOLERANCE)
-        return np.concatenate([points, quaternion_from_matrix(rotations)], axis=-1)
+        return frames_of(self.curve, s)
 
     def residual(self, s: Array, poses: Array) -> Array:
         """(T,) m: what eq. (1) leaves: the poses against an integration of the curve with wider steps."""

@@ -22,6 +22,7 @@ from bodyplan.gaits.following import (
     SLIP,
     Following,
     body_curve,
+    frames_of,
     peaks,
     rest_on_floor,
     rule_notes,
@@ -116,6 +117,11 @@ class Serpentine(Gait):
                 raise InputError(f"{field}: times must increase, got {[row[0] for row in rows]}.")
             if isinstance(rows, tuple) and rows and rows[0][0] < 0.0:
                 raise InputError(f"{field}: times must be >= 0, got {rows[0][0]}.")
+            if isinstance(rows, tuple) and rows and self.pace.stop is not None and rows[-1][0] >= self.pace.stop:
+                raise InputError(
+                    f"{field}: times must be < stop, {self.pace.stop} s, after which the body goes nowhere; got "
+                    f"{rows[-1][0]}."
+                )
         if len(self.changes) > MOST_CHANGES:
             raise InputError(f"changes: at most {MOST_CHANGES}, got {len(self.changes)}.")
         self.change_length = None if change_length is None else number(change_length, "change_length", above=0.0)
@@ -186,12 +192,13 @@ class Serpentine(Gait):
         joints = following.joints(sigma, speed, acceleration)
         on_curve = following.poses(sigma)
         if self.base == "follow":
-            base = with_kink(compose(body.placing.pose, on_curve), joints.kink)
+            base = with_kink(compose(body.pose, on_curve), joints.kink)
         else:
             base = body.evenly(sigma, joints.q)
         rise, heights = rest_on_floor(robot, ground, joints.q, base, type(self).__name__)
-        placing = body.placing.raised(rise)
         base[:, 2] += rise
+        placing = body.placing.raised(rise)
+        pose = body.pose + rise * np.eye(7)[2]
         contacts, lift, within = touching(heights, self.touch, self._covers(robot, t))
         facts = body.facts(placing, sigma, t)
         facts["lift"] = lift
@@ -208,7 +215,9 @@ class Serpentine(Gait):
             qdd=joints.qdd,
             residual=following.residual(sigma, on_curve),
             status=following.within_limits(joints.q),
-            claims=tuple(self._claims(body, placing, sigma, speed, base, on_curve, joints.kink, contacts is None)),
+            claims=tuple(
+                self._claims(body, placing, pose, sigma, speed, base, on_curve, joints.kink, contacts is None)
+            ),
             contacts=None if contacts is None else contacts.astype(np.float64),
             facts=facts,
             notes=tuple(self._notes(body, placing, within if contacts is not None else None)),
@@ -223,6 +232,7 @@ class Serpentine(Gait):
         self,
         body: SerpentineBody,
         placing: Placing,
+        pose: Array,
         sigma: Array,
         speed: Array,
         base: Array,
@@ -234,7 +244,7 @@ class Serpentine(Gait):
         places = sigma[:, None] + following.stations
         claims = []
         if self.base == "follow":
-            claims.append(following.follows(placing.pose, places))
+            claims.append(following.follows(pose, places))
             data = {"frames": list(following.frames), "speed": speed, "tolerance": SLIP}
             claims.append(Claim("no_slip", "frames move along the body", data))
         else:
@@ -273,11 +283,14 @@ class Serpentine(Gait):
 
 @dataclass(frozen=True, eq=False)
 class SerpentineBody:
-    """A :class:`Serpentine` fitted to a robot: the curve under way, and where it lies."""
+    """A :class:`Serpentine` fitted to a robot: the curve under way, and where it lies. ``placing``: of the curve that
+    the body begins on; ``pose`` (7,) of the frame at s = 0 of the curve under way, in the end without the rise to the
+    floor. Both are one where nothing changes between s = 0 and the body."""
 
     gait: Serpentine
     following: Following
     placing: Placing
+    pose: Array
 
     @classmethod
     def of(cls, gait: Serpentine, robot: Robot) -> SerpentineBody:
@@ -289,7 +302,14 @@ class SerpentineBody:
         for curve in (before, *(after.untwisted() for _, after in gait.changes)):
             following.must_bend(curve, gait.pace.start, type(gait).__name__)
         first = before + Constant(kappa_y=gait.steer) if isinstance(gait.steer, float) and gait.steer else before
-        return cls(gait, Following(robot, course, gait.p), place(first, gait.pace.start, length))
+        placing = place(first, gait.pace.start, length)
+        following = Following(robot, course, gait.p)
+        pose = placing.pose
+        if gait.changes or isinstance(gait.steer, tuple):
+            # the two curves have one frame where the tail begins
+            at = np.array([gait.pace.start])
+            pose = compose(pose, compose(frames_of(first, at), inverse(frames_of(course, at)))[0])
+        return cls(gait, following, placing, pose)
 
     def facts(self, placing: Placing, sigma: Array, t: Array) -> dict[str, float]:
         """Numbers of the plan, SI; ``placing`` as it lies in the end."""
@@ -357,13 +377,20 @@ def _course(gait: Serpentine, before: BodyCurve, length: float) -> BodyCurve:
         at, new = leading(time), after.untwisted()
         course = Transition(course, new, at, width) if ahead else Transition(new, course, at - width, width)
     if isinstance(gait.steer, tuple):
-        rows = gait.steer
         width = gait.change_length or gait.curve.period or 0.5 * length
-        places, values = [leading(time) for time, _ in rows], [value for _, value in rows]
+        places: list[float] = []
+        values: list[float] = []
+        for time, value in gait.steer:
+            place = leading(time) - (0.0 if ahead else width)
+            # while a ramp begins or ends the body may not move between two times: the later value holds
+            if places and gait.pace.direction * (place - places[-1]) <= 0.0:
+                values[-1] = value
+                continue
+            places.append(place)
+            values.append(value)
         if ahead:
             return course + Steering(places, values, width)
-        earlier = [place - width for place in places[::-1]]
-        return course + Steering(earlier, [*values[-2::-1], 0.0], width, initial=values[-1])
+        return course + Steering(places[::-1], [*values[-2::-1], 0.0], width, initial=values[-1])
     return course + Constant(kappa_y=gait.steer) if gait.steer else course
 
 
