@@ -135,6 +135,48 @@ def test_steering_turns_by_steer_times_wavelength(steer):
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
 
 
+@pytest.mark.parametrize("robot", ["ACM-L2", "yaw"])
+@pytest.mark.parametrize("base", ["follow", "chassis"])
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("steer", [0.0, 0.5, -2.0])
+def test_facts_are_what_is_planned(robot, base, direction, steer):
+    robot = ROBOTS[robot]
+    motion = planned(bp.Serpentine(WAVE, 0.16, direction, steer, base=base, start=0.13), robot, cycles=2)
+    facts = motion.facts
+    moved = motion.base[100, :3] - motion.base[0, :3]
+    expected = [facts["advance_per_cycle"], facts["sideways_per_cycle"], 0.0]
+    np.testing.assert_allclose(moved, expected, atol=1e-10)
+    assert facts["advance_per_body_length"] == pytest.approx(moved[0] / facts["body_length"], rel=1e-9)
+    turned = rotation_log(motion.poses().rotations[100, 0] @ motion.poses().rotations[0, 0].T)
+    np.testing.assert_allclose(turned, [0, 0, facts["turn_per_cycle"]], atol=1e-10)
+    assert facts["turn_per_cycle"] == pytest.approx(direction * steer * 0.64, abs=1e-9)
+    # the centre of mass, as far as it goes in a cycle; every body of these robots weighs
+    poses, bodies = motion.poses(), [robot.base_body, *(element.body for element in robot.elements)]
+    centres = [
+        sum(b.mass * (poses.positions[k, i] + poses.rotations[k, i] @ b.com) for i, b in enumerate(bodies) if b)
+        / sum(b.mass for b in bodies if b)
+        for k in (0, 100)
+    ]
+    size = np.linalg.norm(centres[1] - centres[0])
+    assert facts["no_slip_speed"] == pytest.approx(size / facts["period"], rel=1e-9)
+    assert facts["speed"] == pytest.approx(direction * size / facts["period"], rel=1e-9)
+    assert bp.check(motion)["the cycle closes"].passed
+
+
+def test_backward_cycle_is_the_inverse_of_the_forward_one():
+    there, back = (planned(bp.Serpentine(WAVE, 0.16, direction, 0.8)) for direction in (1, -1))
+    cycle, inverse_cycle = (next(c.data for c in m.claims if c.kind == "periodic") for m in (there, back))
+    both = [compose(np.append(d["advance"], [1, 0, 0, 0.0]), _turned(d["turn"])) for d in (cycle, inverse_cycle)]
+    np.testing.assert_allclose(compose(*both), [0, 0, 0, 1, 0, 0, 0], atol=1e-12)
+    # the same curve in the same place, and the way back begins where the way there does
+    assert abs(back.facts["sideways_per_cycle"]) > 0.1 and abs(there.facts["sideways_per_cycle"]) < 1e-12
+
+
+def _turned(vector):
+    angle = np.linalg.norm(vector)
+    return np.concatenate([np.zeros(3), [np.cos(0.5 * angle)], np.sin(0.5 * angle) / angle * np.asarray(vector)])
+
+
 def test_smooth_start_and_stop():
     gait = bp.Serpentine(WAVE, 0.16, ramp=1.0, stop=5.0)
     t = np.linspace(0.0, 6.0, 6001)

@@ -21,6 +21,7 @@ from bodyplan.gaits.base import Gait
 from bodyplan.gaits.following import (
     SLIP,
     Following,
+    Joints,
     body_curve,
     frames_of,
     peaks,
@@ -29,12 +30,12 @@ from bodyplan.gaits.following import (
     with_kink,
 )
 from bodyplan.gaits.pace import Pace
-from bodyplan.gaits.placing import Placing, place
+from bodyplan.gaits.placing import SAME_WAY, Placing, place
 from bodyplan.gaits.touching import touching
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.model import Robot
-from bodyplan.spatial import compose, inverse
+from bodyplan.spatial import compose, inverse, quaternion_exp, rotate
 from bodyplan.units import to_si
 
 BASES = ("follow", "chassis")
@@ -65,6 +66,13 @@ class Serpentine(Gait):
     lowest contact of the whole motion touches the floor. ``p``: parameter of eqs. (11)-(16), default the Gauss node.
     ``touch`` m: contacts that come down to within this height count as touching (see
     :func:`bodyplan.gaits.touching.touching`); default a fifth of the lift.
+
+    Facts of a gait that repeats: ``advance_per_cycle`` and ``sideways_per_cycle`` m are the x and y of the base's
+    displacement over the cycle from t = 0, ``turn_per_cycle`` rad its turn about z. ``no_slip_speed`` m/s is that of
+    the centre of mass (where there are no masses: the mean of the frames): its displacement over the cycle from t = 0
+    by the period; ``speed`` is the same with the sign of ``direction``, along the axis for a spiral. Where the gait
+    turns, base and centre are on circles of their own. A body that goes backward goes back along its curve: it turns by
+    minus steer times a wavelength.
 
     Joint angles, rates and accelerations are exact in time, by the rule of :func:`bodyplan.fitting.rule`. Raises
     InputError for values out of range.
@@ -191,16 +199,13 @@ class Serpentine(Gait):
         sigma, speed, acceleration = self.pace.at(t)
         joints = following.joints(sigma, speed, acceleration)
         on_curve = following.poses(sigma)
-        if self.base == "follow":
-            base = with_kink(compose(body.pose, on_curve), joints.kink)
-        else:
-            base = body.evenly(sigma, joints.q)
+        base = body.base(sigma, joints, on_curve)
         rise, heights = rest_on_floor(robot, ground, joints.q, base, type(self).__name__)
         base[:, 2] += rise
         placing = body.placing.raised(rise)
         pose = body.pose + rise * np.eye(7)[2]
         contacts, lift, within = touching(heights, self.touch, self._covers(robot, t))
-        facts = body.facts(placing, sigma, t)
+        facts = body.facts(placing, rise, t)
         facts["lift"] = lift
         if contacts is not None:
             facts["contact_height"] = within
@@ -253,11 +258,7 @@ class Serpentine(Gait):
             claims.append(following.follows(path, places))
         period = self.period(body.following.robot)
         if period is not None:
-            sense = self.pace.direction
-            advance, turn = placing.advance, placing.turn
-            if sense < 0:
-                step = inverse(chassis.part_of(advance, turn, np.asarray(1.0)))
-                advance, turn = step[:3], -turn
+            advance, turn = _cycle(placing, self.pace.direction)
             data = {"period": period, "advance": advance, "turn": turn, "tolerance": CLOSED}
             claims.append(Claim("periodic", "the cycle closes", data))
         if flat and following.robot.contacts:
@@ -311,23 +312,39 @@ class SerpentineBody:
             pose = compose(pose, compose(frames_of(first, at), inverse(frames_of(course, at)))[0])
         return cls(gait, following, placing, pose)
 
-    def facts(self, placing: Placing, sigma: Array, t: Array) -> dict[str, float]:
-        """Numbers of the plan, SI; ``placing`` as it lies in the end."""
+    def base(self, sigma: Array, joints: Joints, on_curve: Array) -> Array:
+        """Base poses (T, 7) with the tail at ``sigma`` (T,) m, the frames of the curve there ``on_curve`` (T, 7)."""
+        if self.gait.base == "follow":
+            return with_kink(compose(self.pose, on_curve), joints.kink)
+        return self._evenly(sigma, joints.q)
+
+    def facts(self, placing: Placing, rise: float, t: Array) -> dict[str, float]:
+        """Numbers of the plan, SI; ``placing`` as it lies in the end, ``rise`` m above that of this body."""
         gait, following = self.gait, self.following
         out = {"body_length": following.length, "speed_along_body": gait.pace.speed}
         period = gait.period(following.robot)
         if placing.period is not None and gait._repeats:
-            wave, moved = placing.period, gait.pace.direction * placing.displacement
+            wave = placing.period
             time = wave / gait.pace.speed
-            advance = float(moved[0])
+            advance, turn = _cycle(placing, gait.pace.direction)
+            sigma = np.array([gait.pace.start])
+            joints = following.joints(sigma, np.ones(1), np.zeros(1))
+            base = self.base(sigma, joints, following.poses(sigma))
+            base[:, 2] += rise
+            centre = compose(base, chassis.mean_frames(following.robot, joints.q))
+            moved, travelled = (rotate(quaternion_exp(turn), x) + advance - x for x in (base[0, :3], centre[0, :3]))
+            size = float(np.linalg.norm(travelled))
+            # a spiral turns about x, which moves its centre round but not along
+            coils = abs(turn[0]) > SAME_WAY * float(np.linalg.norm(turn))
+            speed = (abs(float(travelled[0])) if coils else size) / time
             out |= {
                 "wavelength": wave,
-                "advance_per_cycle": advance,
+                "advance_per_cycle": float(moved[0]),
                 "sideways_per_cycle": float(moved[1]),
-                "advance_per_body_length": advance / following.length,
-                "speed": advance / time,
-                "no_slip_speed": float(np.linalg.norm(moved)) / time,
-                "turn_per_cycle": gait.pace.direction * float(placing.turn[2]),
+                "advance_per_body_length": float(moved[0]) / following.length,
+                "speed": gait.pace.direction * speed,
+                "no_slip_speed": size / time,
+                "turn_per_cycle": float(turn[2]),
             }
             if period is not None:
                 out["period"] = period
@@ -350,13 +367,22 @@ class SerpentineBody:
         frames = compose(base, chassis.mean_frames(self.following.robot, joints.q))
         return chassis.mean_pose(compose(chassis.part_of(placing.advance, placing.turn, -share), frames))
 
-    def evenly(self, sigma: Array, q: Array) -> Array:
+    def _evenly(self, sigma: Array, q: Array) -> Array:
         """Base poses (T, 7) with which the mean body frame moves evenly with sigma."""
         placing = self.placing
         assert placing.period is not None
         share = (sigma - self.gait.pace.start) / placing.period
         mean = compose(chassis.part_of(placing.advance, placing.turn, share), self._middle)
         return compose(mean, inverse(chassis.mean_frames(self.following.robot, q)))
+
+
+def _cycle(placing: Placing, direction: int) -> tuple[Array, Array]:
+    """``advance`` (3,) m and ``turn`` (3,) rad of a cycle, ``p -> R(turn) p + advance``: the motion over a period of
+    the curve, its inverse for a body that goes backward."""
+    advance, turn = placing.advance, placing.turn
+    if direction < 0:
+        advance, turn = rotate(quaternion_exp(-turn), -advance), -turn
+    return advance, turn
 
 
 @lru_cache(maxsize=16)
