@@ -176,6 +176,19 @@ def test_points_that_crowd(gap: float) -> None:
     assert np.hypot(*sampled.shape(inside)[1:]) == pytest.approx(1.0 / 1.09, rel=1e-2)
 
 
+@pytest.mark.parametrize("seed", [4, 10, 18])
+def test_slow_spans_do_not_halve_to_rounding(seed: int) -> None:
+    # in a tight turn the speed falls to a hundredth, and with it the digits of the tangent: no cusp, but a hairpin
+    noise = np.random.default_rng(seed).normal(scale=0.02, size=(100, 2))
+    with pytest.raises(bp.InputError, match=r"turns by [45]\.\d+ rad"):
+        bp.Sampled(np.column_stack([np.linspace(0.0, 1.0, 100), noise]))
+
+
+def test_places_that_overflow() -> None:
+    with pytest.raises(bp.InputError, match="points: must be within"):
+        bp.Sampled(1e200 * helix(np.linspace(0.0, 3.0, 10)))
+
+
 def test_files(tmp_path: Path) -> None:
     points = plus_noise(11)
     np.save(tmp_path / "points.npy", points)

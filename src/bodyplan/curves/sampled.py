@@ -22,6 +22,8 @@ from bodyplan.spatial.rotations import conjugate
 MOST_POINTS = 100_000
 #: nearest neighbours, as a part of the length of the polygon
 NEAREST = 1e-12
+#: m: places beyond it, whose squares overflow or lose everything, are refused
+FARTHEST = 1e100
 #: places of one evaluation: keeps the working memory small
 CHUNK = 32768
 
@@ -49,6 +51,9 @@ class Sampled(BodyCurve):
         self.points = frozen(given)
         places = np.zeros((len(given), 3))
         places[:, : given.shape[1]] = given
+        far = float(np.abs(places).max())
+        if far > FARTHEST:
+            raise InputError(f"points: must be within {FARTHEST:g} m of the origin, got {far:g} m.")
         chords = np.linalg.norm(np.diff(places, axis=0), axis=1)
         near = np.flatnonzero(chords <= NEAREST * chords.sum())
         if len(near):

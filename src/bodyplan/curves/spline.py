@@ -15,6 +15,8 @@ from bodyplan.errors import InputError
 REFITS, SETTLED = 12, 1e-10
 #: how well the polynomials of a cell must fit before it is halved once more and kept
 FITTED = 2e-14
+#: how badly they may fit where rounding of the tangent allows no better
+BLURRED = 1e-9
 #: smallest cell as a part of its span: below it the curve has a cusp
 SMALLEST = 1e-7
 #: slowest speed at the end of a cell, as a part of the fastest
@@ -128,6 +130,9 @@ class ArcLengthSpline:
         span = np.arange(len(self._knots) - 1)
         sizes = np.diff(self._knots)
         low, high = np.zeros(len(span)), sizes
+        third, second, first_order = (np.linalg.norm(terms, axis=1) for terms in self._terms[:3])
+        # of dc/du, whose terms cancel where the curve slows down; the tangent there is no better, however small a cell
+        rounding = 8.0 * np.finfo(float).eps * (first_order + sizes * (2.0 * second + 3.0 * sizes * third))
         done: list[tuple[IntArray, Array, Array]] = []
         while len(span):
             small = high - low < SMALLEST * sizes[span]
@@ -139,7 +144,9 @@ class ArcLengthSpline:
             whole, halves = self._fields(span, low, high), self._fields(twice, first, last)
             both = halves.reshape(-1, 2 * ORDER, 4)
             off = np.abs(np.einsum("mn,cnj->cmj", HALVES, whole) - both).max(axis=(1, 2))
-            good = off <= FITTED * np.maximum(1.0, both[:, :, 0].max(axis=1))
+            slow, fast = both[:, :, 0].min(axis=1), both[:, :, 0].max(axis=1)
+            blurred = np.minimum(rounding[span] / np.maximum(slow, np.finfo(float).tiny), BLURRED)
+            good = off <= np.maximum(FITTED * np.maximum(1.0, fast), blurred)
             kept = np.repeat(good, 2)
             done.append((twice[kept], first[kept], last[kept]))
             span, low, high = twice[~kept], first[~kept], last[~kept]
