@@ -53,6 +53,17 @@ def test_passes_its_checks(robot, name):
     assert {"follows", "periodic", "grips"} <= {line.kind for line in report if line.passed}
 
 
+@pytest.mark.parametrize("name", [*SIDE, *ROLL])
+@pytest.mark.parametrize("robot", ["fine arcs", "arcs", "doubles"])
+@pytest.mark.parametrize("shift", [(0.0, 0.03, 0.0), (0.0, 0.0, 0.01)], ids=["sideways", "up"])
+def test_a_shifted_base_is_refused(robot, name, shift):
+    motion = planned(ALL[name](), ROBOTS[robot], samples=40)
+    base = motion.base.copy()
+    base[:, :3] += shift
+    report = bp.check(motion.replace(base=base))
+    assert "follows" in {line.kind for line in report.failures}, str(report)
+
+
 @pytest.mark.parametrize("name", list(POLE))
 def test_climbs_without_slip(name):
     gait = POLE[name]()
@@ -66,6 +77,8 @@ def test_climbs_without_slip(name):
     assert facts["helix_pitch"] == pytest.approx(2 * np.pi * abs(twist) / (k * k + twist * twist), rel=1e-14)
     climb = abs(gait.rate) * r * abs(k) / np.hypot(k, twist)
     assert abs(facts["climbing_speed"]) == pytest.approx(climb, rel=1e-9)
+    up = gait.rate > 0.0 if twist >= 0.0 else gait.rate < 0.0
+    assert (facts["climbing_speed"] > 0.0) == up
     # every part touches the pole all the time
     axis = np.eye(3)[0 if gait.axis == "x" else 2]
     data = next(c.data for c in motion.claims if c.kind == "grips")["pole"]

@@ -81,6 +81,36 @@ def test_rates_and_accelerations_are_those_of_the_positions(name):
     np.testing.assert_allclose(np.einsum("k,tkn->tn", second, q), qdd[:, 2], atol=2e-5)
 
 
+SHIFTED = [name for name in GAITS if name != "spiral"]
+
+
+@pytest.mark.parametrize("name", SHIFTED)
+@pytest.mark.parametrize("robot", ["ACM-L2", "arc", "double"])
+@pytest.mark.parametrize("shift", [(0.0, 0.03, 0.0), (0.0, 0.0, 0.01)], ids=["sideways", "up"])
+def test_a_shifted_base_is_refused(robot, name, shift):
+    motion = planned(GAITS[name](), ROBOTS[robot], samples=50)
+    base = motion.base.copy()
+    base[:, :3] += shift
+    report = bp.check(motion.replace(base=base))
+    assert "follows" in {line.kind for line in report.failures}, str(report)
+
+
+def test_tolerance_is_twice_what_a_fit_leaves():
+    for name in ("serpentine", "lifted", "changed"):
+        gait = GAITS[name]()
+        motion = planned(gait)
+        data = next(claim.data for claim in motion.claims if claim.kind == "follows")
+        distances = [gait.fit_at(ACM, t).max_distance for t in np.linspace(0.0, motion.t[-1], 101)]
+        assert data["tolerance"] == pytest.approx(2.0 * max(distances), rel=0.05)
+        assert data["tolerance"] < 0.25 * 0.5 * 0.078  # of half a unit
+    # a mechanism as coarse as this leaves its curve by more than half a unit: no tolerance is made for that
+    coarse = bp.snake(12, 0.1, axes="universal")
+    steep = planned(bp.Serpentine({"kind": "serpenoid", "alpha": 1.6, "wavelength": 0.25}, 0.1), coarse)
+    data = next(claim.data for claim in steep.claims if claim.kind == "follows")
+    assert data["tolerance"] == pytest.approx(0.5 * 1.2 / 11, rel=1e-12)
+    assert "follows" in {line.kind for line in bp.check(steep).failures}
+
+
 def test_wave_runs_tailward_and_the_body_forward():
     """The joints at (s, t) bend as those a wavelength share further ahead did before: q(s, t) = f(s + v t)."""
     robot = bp.snake(64, 0.02, axes="yaw")

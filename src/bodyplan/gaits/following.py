@@ -24,8 +24,11 @@ from bodyplan.spatial.poses import IDENTITY
 if TYPE_CHECKING:
     from bodyplan.fitting import Bends
 
-#: share of a unit (see :class:`Following`) by which frames may leave the curve; coarse mechanisms leave it by more
-NEAR = 0.5
+#: frames may leave the curve by this many times the largest distance that a fit leaves, no less than a share of the
+#: body's length, no more than a share of a unit (see :class:`Following`): coarser mechanisms do not follow it
+TWICE, LEAST, NEAR = 2.0, 1e-4, 0.5
+#: fits of a cycle that the distance is taken from
+FITS = 25
 #: share of the speed along the body by which its frames may move otherwise (root mean square)
 SLIP = 0.35
 #: samples of the integration that are done again with a wider step
@@ -104,8 +107,9 @@ class Following:
         off = np.linalg.norm(points - poses[probes, :3], axis=-1)
         return np.asarray(np.interp(np.arange(len(s)), probes, off))
 
-    def follows(self, pose: Array, places: Array, label: str = "frames on the body curve") -> Claim:
-        """The claim that the frames are on the curve at ``places`` (T, F) m when its s = 0 lies at ``pose``."""
+    def follows(self, pose: Array, places: Array, distance: float, label: str = "frames on the body curve") -> Claim:
+        """The claim that the frames are on the curve at ``places`` (T, F) m when its s = 0 lies at ``pose``, as near as
+        this mechanism can be: ``distance`` m is the largest that fits to the curve leave."""
         return Claim(
             "follows",
             label,
@@ -114,7 +118,7 @@ class Following:
                 "pose": pose,
                 "places": places,
                 "frames": list(self.frames),
-                "tolerance": NEAR * self.unit,
+                "tolerance": min(NEAR * self.unit, max(TWICE * distance, LEAST * self.length)),
             },
         )
 

@@ -14,7 +14,17 @@ from bodyplan.curves.constant import Constant
 from bodyplan.curves.spiral import Spiral
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.base import Gait
-from bodyplan.gaits.following import Following, Joints, in_time, peaks, rest_on_floor, rolled, rule_notes, with_kink
+from bodyplan.gaits.following import (
+    FITS,
+    Following,
+    Joints,
+    in_time,
+    peaks,
+    rest_on_floor,
+    rolled,
+    rule_notes,
+    with_kink,
+)
 from bodyplan.gaits.serpentine import CLOSED, FINE
 from bodyplan.gaits.touching import pole_gaps
 from bodyplan.ground.base import Ground
@@ -47,7 +57,8 @@ class Rolling(Gait):
       without slip; the slip grows with the arc's angle). A helix lies with its axis along +x, the middle of the body
       lowest, and moves by rate r across the tangent at its lowest points, where all coils roll without slip.
     * ``"pole"``: the helix (or ring) grips a pole of radius |k| / (k^2 + twist^2) - r from outside and climbs: by
-      rate r k / sqrt(k^2 + twist^2) along the pole, while it turns about it so that nothing slips. ``axis``: the pole,
+      rate r |k| sign(twist) / sqrt(k^2 + twist^2) along the pole (sign(0) = 1), while it turns about it so that nothing
+      slips. ``axis``: the pole,
       and so the head, points along "x" or up "z"; it goes through x = y = 0.
 
     The lowest contact of the whole motion touches the floor; with ``around="floor"`` the tail end starts at the
@@ -154,7 +165,7 @@ class Rolling(Gait):
             grip["height"] = TOUCH * float(heights.max()) if self.touch is None else self.touch
             contacts = heights <= grip["height"]
         claims = (
-            following.follows(path, places, "frames on the curve that stays in space"),
+            following.follows(path, places, self._farthest(robot), "frames on the curve that stays in space"),
             Claim("periodic", "the cycle closes", data),
             Claim("grips", "what touches is at rest", grip),
         )
@@ -174,6 +185,11 @@ class Rolling(Gait):
             facts=self._facts(body, contacts is not None, float(heights.max()), grip["height"]),
             notes=tuple(self._notes(body)),
         )
+
+    def _farthest(self, robot: Robot) -> float:
+        """m: largest distance that fits over a cycle leave to the body curve."""
+        times = np.linspace(0.0, self.period(robot), FITS)
+        return max(float(self.fit_at(robot, float(t)).max_distance) for t in times)
 
     def _facts(self, body: _Roll, lifts: bool, lift: float, within: float) -> dict[str, float]:
         period = self.period(body.following.robot)

@@ -19,6 +19,7 @@ from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits import chassis
 from bodyplan.gaits.base import Gait
 from bodyplan.gaits.following import (
+    FITS,
     SLIP,
     Following,
     Joints,
@@ -249,13 +250,13 @@ class Serpentine(Gait):
         places = sigma[:, None] + following.stations
         claims = []
         if self.base == "follow":
-            claims.append(following.follows(pose, places))
+            claims.append(following.follows(pose, places, body.farthest(sigma)))
             data = {"frames": list(following.frames), "speed": speed, "tolerance": SLIP}
             claims.append(Claim("no_slip", "frames move along the body", data))
         else:
             # the curve moves with the chassis
             path = compose(base, inverse(with_kink(on_curve, kink)))
-            claims.append(following.follows(path, places))
+            claims.append(following.follows(path, places, body.farthest(sigma)))
         period = self.period(body.following.robot)
         if period is not None:
             advance, turn = _cycle(placing, self.pace.direction)
@@ -353,6 +354,19 @@ class SerpentineBody:
         fit = gait.fit_at(following.robot, float(t[0]))
         out |= {"fit_error": float(fit.error), "fit_distance": float(fit.max_distance)}
         return out
+
+    def farthest(self, sigma: Array) -> float:
+        """m: largest distance that fits leave to the curve where the tail comes to, ``sigma`` (T,) m, or over a period
+        where the curve has one."""
+        from bodyplan.fitting import fit
+
+        curve = self.following.curve
+        low, high = float(sigma.min()), float(sigma.max())
+        if curve.period is not None:
+            low, high = self.gait.pace.start, self.gait.pace.start + curve.period
+        count = int(np.clip((high - low) / self.following.unit, FITS, FINE))
+        found = fit(curve, self.following.robot, p=self.gait.p, start=np.linspace(low, high, count))
+        return float(found.max_distance.max())
 
     @cached_property
     def _middle(self) -> Array:

@@ -15,7 +15,17 @@ from bodyplan.curves.constant import Constant
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.errors import InputError
 from bodyplan.gaits.base import Gait
-from bodyplan.gaits.following import Following, Joints, in_time, peaks, rest_on_floor, rolled, rule_notes, with_kink
+from bodyplan.gaits.following import (
+    FITS,
+    Following,
+    Joints,
+    in_time,
+    peaks,
+    rest_on_floor,
+    rolled,
+    rule_notes,
+    with_kink,
+)
 from bodyplan.gaits.pace import Pace
 from bodyplan.gaits.placing import SAMPLES, TOLERANCE, across
 from bodyplan.gaits.serpentine import CLOSED, FINE
@@ -147,7 +157,7 @@ class Sidewinding(Gait):
         covers = float(t[-1] - t[0]) >= 0.95 * self.period(robot)
         contacts, _, within = touching(heights, TOUCH * lift if self.touch is None else self.touch, covers)
         # the torsion does not move the points of the curve
-        claims = [following.follows(path, sigma[:, None] + following.stations)]
+        claims = [following.follows(path, sigma[:, None] + following.stations, self._farthest(robot))]
         data = {"period": self.period(robot), "advance": level.advance, "turn": 0.0, "tolerance": CLOSED}
         claims.append(Claim("periodic", "the cycle closes", data))
         if robot.contacts:
@@ -173,6 +183,11 @@ class Sidewinding(Gait):
             facts=self._facts(body, level) | {"lift": lift, "contact_height": within},
             notes=tuple(notes),
         )
+
+    def _farthest(self, robot: Robot) -> float:
+        """m: largest distance that fits over a cycle leave to the wave."""
+        times = np.linspace(0.0, self.period(robot), FITS)
+        return max(float(self.fit_at(robot, float(t)).max_distance) for t in times)
 
     def _facts(self, body: _Sidewinder, level: _Level) -> dict[str, float]:
         following = body.following
