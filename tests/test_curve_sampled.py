@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import bodyplan as bp
+from bodyplan import curves as bc
 from bodyplan.spatial import matrix_from_quaternion
 from curve_cases import followed
 
@@ -241,3 +242,17 @@ def test_bad_files(tmp_path: Path, name: str, content: str, text: str) -> None:
 def test_refusals(points: object, text: str) -> None:
     with pytest.raises(bp.InputError, match=text):
         bp.Sampled(points)  # type: ignore[arg-type]
+
+
+def test_a_table_takes_points_with_units_and_files_of_points(tmp_path: Path) -> None:
+    points = [[0.0, 0.0], [0.1, 0.02], [0.2, 0.0], [0.3, -0.05]]
+    plain = bp.Sampled(points)
+    texts = [["0 mm", 0.0], ["10 cm", "20 mm"], ["0.2 m", 0], [0.3, "-50 mm"]]
+    assert bc.from_dict({"kind": "sampled", "points": texts}).to_dict() == plain.to_dict()
+    file = tmp_path / "way.csv"
+    file.write_text("x,y\n" + "\n".join(f"{x},{y}" for x, y in points), encoding="utf-8")
+    assert bc.from_dict({"kind": "sampled", "points": str(file)}) == plain
+    with pytest.raises(bp.InputError, match="no such file"):
+        bc.from_dict({"kind": "sampled", "points": str(tmp_path / "none.csv")})
+    with pytest.raises(bp.InputError, match=r"points\[1\]\[0\]"):
+        bc.from_dict({"kind": "sampled", "points": [[0, 0], ["3 kg", 1], [2, 2], [3, 3]]})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -41,6 +41,7 @@ class Sampled(BodyCurve):
     """
 
     kind: ClassVar[str] = "sampled"
+    UNITS: ClassVar[Mapping[str, str]] = {"points": "length"}
 
     def __init__(self, points: ArrayLike) -> None:
         given = finite(points, "points")

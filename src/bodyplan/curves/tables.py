@@ -8,7 +8,8 @@ from typing import Any
 
 from bodyplan.curves.base import BodyCurve
 from bodyplan.curves.constant import Constant
-from bodyplan.curves.sampled import Sampled
+from bodyplan.curves.pointfiles import read_points
+from bodyplan.curves.sampled import MOST_POINTS, Sampled
 from bodyplan.curves.segments import Segments
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.curves.sinuslift import SinusLift
@@ -32,7 +33,8 @@ NESTED = ("curve", "before", "after", "parts")
 
 
 def from_dict(data: Mapping[str, Any]) -> BodyCurve:
-    """The curve of a table: ``kind`` and the options of that class; quantities may be texts such as "30 deg".
+    """The curve of a table: ``kind`` and the options of that class; quantities may be texts such as "30 deg", and the
+    points of a sampled curve may be the name of a file that :meth:`bodyplan.Sampled.from_file` reads.
 
     Raises UnknownNameError for another kind or option, InputError for a missing option, a wrong value, or curves
     nested deeper than :data:`DEEPEST`.
@@ -75,6 +77,13 @@ def _value(cls: type[BodyCurve], name: str, value: Any, where: str, deeper: int)
     dimension = cls.UNITS.get(name)
     if dimension is None or value is None:
         return value
+    if cls is Sampled and isinstance(value, str):
+        return read_points(value, MOST_POINTS)
+    return _quantities(value, dimension, where)
+
+
+def _quantities(value: Any, dimension: str, where: str) -> Any:
+    """Numbers in SI of a quantity or of lists of them."""
     if isinstance(value, list | tuple):
-        return [to_si(item, dimension, f"{where}[{i}]") for i, item in enumerate(value)]
+        return [_quantities(item, dimension, f"{where}[{i}]") for i, item in enumerate(value)]
     return to_si(value, dimension, where)
