@@ -486,7 +486,7 @@ REFUSED = {
     "change_length: ": lambda: bp.Serpentine(WAVE, change_length=0.0),
     "alpha": lambda: bp.SinusLifting("75 deg", 0.3, 0.64),
     "wavelength": lambda: bp.SinusLifting(1.0, 0.3, 0.0),
-    "c1": lambda: bp.SinusLifting(2.4048, 0.3, 0.64),
+    "c1: no value that keeps .* is connected with c1 = 0": lambda: bp.SinusLifting(2.4048, 0.3, 0.64),
 }
 
 

@@ -13,11 +13,10 @@ import numpy as np
 from bodyplan.arrays import Array, number
 from bodyplan.curves.base import BodyCurve
 from bodyplan.curves.constant import Constant
-from bodyplan.curves.steering import Steering
-from bodyplan.curves.transition import Transition
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits import chassis
 from bodyplan.gaits.base import Gait
+from bodyplan.gaits.course import course_of
 from bodyplan.gaits.following import (
     FITS,
     SLIP,
@@ -300,7 +299,7 @@ class SerpentineBody:
         before = gait.curve.untwisted()
         following = Following(robot, before, gait.p)
         length = following.length
-        course = _course(gait, before, length)
+        course = course_of(gait, before, length)
         for curve in (before, *(after.untwisted() for _, after in gait.changes)):
             following.must_bend(curve, gait.pace.start, type(gait).__name__)
         first = before + Constant(kappa_y=gait.steer) if isinstance(gait.steer, float) and gait.steer else before
@@ -402,36 +401,6 @@ def _cycle(placing: Placing, direction: int) -> tuple[Array, Array]:
 @lru_cache(maxsize=16)
 def _fitted(gait: Serpentine, robot: Robot) -> SerpentineBody:
     return SerpentineBody.of(gait, robot)
-
-
-def _course(gait: Serpentine, before: BodyCurve, length: float) -> BodyCurve:
-    """The curve under way: what the leading end takes over from a time on holds from there on."""
-    ahead = gait.pace.direction > 0
-
-    def leading(time: float) -> float:
-        return float(gait.pace.at(np.asarray(time))[0]) + (length if ahead else 0.0)
-
-    course = before
-    for time, after in gait.changes:
-        width = gait.change_length or after.period or 0.5 * length
-        at, new = leading(time), after.untwisted()
-        course = Transition(course, new, at, width) if ahead else Transition(new, course, at - width, width)
-    if isinstance(gait.steer, tuple):
-        width = gait.change_length or gait.curve.period or 0.5 * length
-        places: list[float] = []
-        values: list[float] = []
-        for time, value in gait.steer:
-            place = leading(time) - (0.0 if ahead else width)
-            # while a ramp begins or ends the body may not move between two times: the later value holds
-            if places and gait.pace.direction * (place - places[-1]) <= 0.0:
-                values[-1] = value
-                continue
-            places.append(place)
-            values.append(value)
-        if ahead:
-            return course + Steering(places, values, width)
-        return course + Steering(places[::-1], [*values[-2::-1], 0.0], width, initial=values[-1])
-    return course + Constant(kappa_y=gait.steer) if gait.steer else course
 
 
 def _pairs(rows: Any, field: str) -> list[tuple[Any, Any]]:
