@@ -409,3 +409,12 @@ def test_bad_arguments():
 def test_no_start_is_refused():
     with pytest.raises(bp.InputError, match="start"):
         bp.fit(SERPENOID, arcs(5), start=[])
+
+
+def test_universal_joints_are_of_first_order_by_the_rule_and_second_at_the_optimum():
+    spiral = bp.Spiral()
+    snakes = [bp.snake(n, 1.0 / n, axes="universal") for n in (10, 20)]
+    ruled = [bp.fit(spiral, snake).error for snake in snakes]
+    best = [bp.fit(spiral, snake, method="optimal").error for snake in snakes]
+    assert ruled[0] / ruled[1] == pytest.approx(2.0, abs=0.1)
+    assert best[0] / best[1] > 3.5

@@ -298,6 +298,9 @@ def fit(
     ``method`` "paper" (*acm*): straight links by (2)-(3), with kappa(s) as the integrand; arcs by (11)-(17); double
     joints by (33)-(34); angles are never clipped to joint limits. "optimal": the angles within joint limits and the
     kink that minimise E_nm, eq. (6), from the paper's rule on; never worse than the rule within those limits.
+    The error falls with the square of the number of straight or double joints, with the cube for arcs (Gauss node);
+    but in space only as 1/n for straight "universal" joints by the paper's rule, which was made for joints in turns:
+    yaw then pitch at one place also rolls what follows. "optimal" makes up for it.
     ``p`` in (0.5, 1]: the parameter of (11)-(16), default the Gauss node 1/2 + 1/(2 sqrt 3); 0.789 is the paper's.
 
     The joints only bend, so a twisted curve is followed in its frame without roll (``curve.untwisted()``): the points
