@@ -1,5 +1,6 @@
 """A mission at several values of a field, and its figures beside a paper's: what is run, said, written and refused."""
 
+import dataclasses
 import json
 import re
 
@@ -11,7 +12,8 @@ from bodyplan import job
 from bodyplan.metrics import Metrics, metrics_of
 from bodyplan.missions import load_mission, parse_mission
 from bodyplan.missions.files import alone
-from bodyplan.show.beside import Beside, beside, metrics_in, scale_of
+from bodyplan.show.beside import Beside, beside, check_unit, metrics_in, scale_of, trial_names
+from bodyplan.show.dimensions import si_unit
 from bodyplan.show.grids import grid_plot, grid_section, in_words
 from bodyplan.show.outcome import Grid, GridPoint
 
@@ -204,21 +206,108 @@ def test_our_figures_stand_beside_the_papers(worked):
 def test_ratios_units_and_other_missions():
     from types import SimpleNamespace as Row
 
-    figures = {None: {"trial.a": 3.0, "plan.zero": 0.0, "trial.n": None}, "other": {"trial.a": 4.0}}
+    figures = {None: {"trial.a_m": 3.0, "plan.zero": 0.0, "trial.n": None}, "other": {"trial.a_m": 4.0}}
 
     def value(ours, unit=""):
         (row,) = beside([Row(what="w", printed=1.0, unit=unit, ours=ours, source="")], figures)
         assert isinstance(row, Beside)
         return row.value, row.problem
 
-    assert value("trial.a") == (3.0, "")
-    assert value("trial.a", "mm") == (3000.0, "") and value("trial.a", "%") == (pytest.approx(300.0), "")
-    assert value("trial.a", "deg")[0] == pytest.approx(np.degrees(3.0))
-    assert value("trial.a / other:trial.a") == (0.75, "")
-    assert value("trial.a / plan.zero") == (None, "divided by zero")
+    assert value("trial.a_m") == (3.0, "")
+    assert value("trial.a_m", "mm") == (3000.0, "")
+    assert value("trial.a_m / other:trial.a_m", "%") == (pytest.approx(75.0), "")
+    assert value("trial.a_m / other:trial.a_m") == (0.75, "")
+    assert value("trial.a_m / plan.zero") == (None, "divided by zero")
     assert value("trial.n")[0] is None and "no value" in value("trial.n")[1]
-    assert value("other:trial.b") == (None, "no trial.b there, but trial.a")
-    assert value("third:trial.a") == (None, "third was not run")
+    assert value("other:trial.b_m") == (None, "no trial.b_m there, but trial.a_m")
+    assert value("third:trial.a_m") == (None, "third was not run")
+    with pytest.raises(bp.InputError, match=r"paper, row 'w': unit = 'deg'.*in m; write a unit of m"):
+        value("trial.a_m", "deg")
+
+
+@pytest.mark.parametrize(
+    "ours,unit,scale",
+    [
+        ("trial.speed_m_s", "mm/s", 1e-3),
+        ("trial.speed_m_s", "km/h", 1.0 / 3.6),
+        ("trial.slip_angle_rad", "deg", np.pi / 180.0),
+        ("trial.peak_torque_Nm", "mN*m", 1e-3),
+        ("trial.positive_work_J", "kJ", 1e3),
+        ("trial.period_s", "ms", 1e-3),
+        ("trial.tracking_max_m", "um", 1e-6),
+        ("trial.advance_ratio", "%", 0.01),
+        ("trial.cost_of_transport", "", 1.0),
+        ("plan.period", "min", 60.0),
+        ("plan.no_slip_speed", "cm/s", 0.01),
+        ("plan.speed_along_body", "cm/s", 0.01),
+        ("plan.advance_per_cycle", "mm", 1e-3),
+        ("plan.advance_per_body_length", "%", 0.01),
+        ("plan.largest_joint_angle", "deg", np.pi / 180.0),
+        ("plan.peak_joint_rate", "rpm", np.pi / 30.0),
+        ("plan.peak_joint_acceleration", "rad/s^2", 1.0),
+        ("plan.helix_pitch", "mm", 1e-3),
+        ("plan.torsion", "deg/m", np.pi / 180.0),
+        ("trial.speed_m_s / plan.speed", "%", 0.01),
+        ("plan.advance_per_cycle / plan.period", "mm/s", 1e-3),
+        ("plan.turn_per_cycle / plan.advance_per_cycle", "deg/m", np.pi / 180.0),
+        ("trial.positive_work_J / plan.period", "mW", 1e-3),
+        ("trial.peak_torque_Nm / trial.slip_angle_rad", "N*m/deg", 180.0 / np.pi),
+    ],
+)
+def test_units_fit_their_metrics(ours, unit, scale):
+    check_unit(ours, unit)
+    assert scale_of(unit) == pytest.approx(scale, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "ours,unit",
+    [
+        ("trial.speed_m_s", "deg"),
+        ("trial.speed_m_s", "furlong"),
+        ("trial.speed_m_s", "%"),
+        ("trial.slip_angle_rad", "%"),
+        ("trial.advance_ratio", "deg"),
+        ("trial.advance_ratio", "mm"),
+        ("trial.peak_force_N", "N*m"),
+        ("plan.period", "Hz"),
+        ("plan.peak_joint_rate", "Hz"),
+        ("plan.speed", "m"),
+        ("plan.fit_error", "mm"),
+        ("trial.speed_m_s / plan.speed", "mm/s"),
+        ("plan.advance_per_cycle / plan.period", "mm"),
+    ],
+)
+def test_units_of_another_dimension_are_refused(ours, unit):
+    with pytest.raises(bp.InputError, match="unit = ") as caught:
+        check_unit(ours, unit)
+    assert repr(unit) in str(caught.value) and repr(ours) in str(caught.value)
+
+
+def test_every_number_of_a_run_has_the_unit_that_its_name_says():
+    """A name that says nothing is a number without unit: these are all of them."""
+    names = {("trial", name) for name in trial_names(1)}
+    for mission in ("concertina", "concertina-paper", "serpentine", "sidewinding", "sinus-lifting", "spiral"):
+        names |= {("plan", name) for name in job.plan_mission(load_mission(mission)).facts}
+    assert {name for group, name in names if not si_unit(group, name)} == {
+        "advance_per_body_length",
+        "turns_of_helix",
+        "fit_error",
+        "warnings",
+        "cycles",
+        "advance_ratio",
+        "advance_ratio_cycle_1",
+        "forward_ratio",
+        "cost_of_transport",
+    }
+
+
+def test_a_mission_made_by_hand_is_checked_before_it_is_planned():
+    mission = parse(MISSION + PAPER)
+    row = mission.paper[0].model_copy(update={"unit": "deg"})
+    said = []
+    with pytest.raises(bp.InputError, match=r"paper, row 'speed': unit = 'deg'"):
+        job.work(dataclasses.replace(mission, paper=(row,)), progress=lambda step, part: said.append(step))
+    assert said == ["planning"]
 
 
 def test_units_are_those_of_the_house():
@@ -233,6 +322,8 @@ def test_units_are_those_of_the_house():
     "old,new,words",
     [
         ('unit = "mm/s"', 'unit = "mmm/s"', ["mmm/s", "mm/s"]),
+        ('unit = "mm/s"', 'unit = "deg"', [f"line {len(MISSION.splitlines()) + 4}:", "row 'speed'", "'deg'", "trial.speed_m_s", "m/s"]),
+        ('unit = "mm/s"', 'unit = "furlong"', ["row 'speed'", "'furlong'", "m/s"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "trial.sped"\n', ["sped", "Did you mean 'speed_m_s'", "advance_ratio"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "speed"\n', ["speed", "plan.NAME", "A / B"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "trial.a / trial.b / trial.c"\n', ["A / B"]),

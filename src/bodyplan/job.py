@@ -26,7 +26,7 @@ from bodyplan.missions import Mission, load_mission
 from bodyplan.missions.files import alone, model_section, ready_missions
 from bodyplan.motion import Motion
 from bodyplan.plan import MOST_SAMPLES, plan
-from bodyplan.show.beside import Beside, beside, check_facts
+from bodyplan.show.beside import Beside, beside, check_facts, check_units
 from bodyplan.show.outcome import Comparison, Grid, GridPoint, Outcome, Variant, figures_of, no_slip_ratio
 
 if TYPE_CHECKING:
@@ -174,6 +174,7 @@ def _others(jobs: Sequence[tuple[Any, ...]]) -> Iterator[list[Callable[[], Any]]
 def work(mission: Mission, *, simulate: bool = True, compare: bool = True, progress: Progress = _silent) -> Outcome:
     """Plan, check, simulate and compare a mission; nothing is written. See :func:`run`."""
     progress("planning", 0.0)
+    check_units(mission.paper)
     motion = plan_mission(mission)
     for row in mission.paper:
         check_facts(row.ours, motion.facts, mission.name)

@@ -142,7 +142,7 @@ def _check_paper(source: _Source, model: MissionModel, name: str) -> None:
             check_row(row.ours, row.unit, name, model.compare, cycles)
         except InputError as error:
             field = "unit" if str(error).startswith("unit") else "ours"
-            raise InputError(f"{source.at(('paper', i, field))}: paper: {error}") from error
+            raise InputError(f"{source.at(('paper', i, field))}: paper, row {row.what!r}: {error}") from error
 
 
 def _check_grid(source: _Source, grid: Grid, data: dict[str, Any], folder: Path | None, name: str) -> None:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.show.dimensions import over, read_unit, si_unit
 from bodyplan.simulate.trial import Trial
-from bodyplan.units import SI_UNITS, to_si
 
 GROUPS = ("plan", "trial")
 _METRIC = re.compile(r"(?:(?P<mission>[^\s:/]+):)?(?P<group>\w+)\.(?P<name>\w+)")
@@ -66,12 +66,22 @@ def metrics_in(ours: str) -> tuple[Metric, ...]:
 def check_row(ours: str, unit: str, mission: str, compared: Collection[str], cycles: int) -> None:
     """InputError or UnknownNameError for a row whose unit or metrics cannot exist in a run of ``mission`` beside
     ``compared`` ones. Facts of the plan are known after planning only: :func:`check_facts`."""
-    scale_of(unit)
+    read_unit(unit)
     for metric in metrics_in(ours):
         if metric.mission not in (None, mission, *compared):
             raise UnknownNameError("mission", metric.mission, compared, where=f"ours = {ours!r}: not in compare")
         if metric.group == "trial" and metric.name not in (names := trial_names(cycles)):
             raise UnknownNameError("metric of the trial", metric.name, names, where=f"ours = {ours!r}")
+    check_unit(ours, unit)
+
+
+def check_units(rows: Sequence[Any]) -> None:
+    """:func:`check_unit` of every row; the error names the row."""
+    for row in rows:
+        try:
+            check_unit(row.ours, row.unit)
+        except InputError as error:
+            raise InputError(f"paper, row {row.what!r}: {error}") from error
 
 
 def check_facts(ours: str, facts: Collection[str], mission: str) -> None:
@@ -83,7 +93,8 @@ def check_facts(ours: str, facts: Collection[str], mission: str) -> None:
 
 def beside(rows: Sequence[Any], figures: Mapping[str | None, Mapping[str, float | None]]) -> tuple[Beside, ...]:
     """The rows (with fields what, printed, unit, ours, source) with our values; ``figures`` by mission, None: this
-    one."""
+    one. InputError that names the row where its unit is of another dimension than its value."""
+    check_units(rows)
     out = []
     for row in rows:
         values: list[float | None] = []
@@ -111,17 +122,25 @@ def beside(rows: Sequence[Any], figures: Mapping[str | None, Mapping[str, float 
     return tuple(out)
 
 
-@cache
 def scale_of(unit: str) -> float:
     """What one ``unit`` is in SI (1 where it is empty). InputError for a text that is no unit."""
+    return read_unit(unit)[0]
+
+
+def check_unit(ours: str, unit: str) -> None:
+    """InputError for a ``unit`` of another dimension than ``ours``: a ratio has that of the quotient. Without a unit
+    the value stands in SI."""
+    _, given = read_unit(unit)
     if not unit.strip():
-        return 1.0
-    for dimension in SI_UNITS:
-        try:
-            return to_si(f"1 {unit}", dimension)
-        except InputError:
-            continue
-    raise InputError(f"unit = {unit!r}: not a unit; write for example mm/s, deg, N*m, or % for a share.")
+        return
+    units = [si_unit(metric.group, metric.name) for metric in metrics_in(ours)]
+    mine = read_unit(units[0])[1]
+    for below in units[1:]:
+        mine = over(mine, read_unit(below)[1])
+    if given != mine:
+        named = " over ".join(text or "no unit" for text in units)
+        wanted = f"a unit of {named}" if mine else "no unit, or % for a share"
+        raise InputError(f"unit = {unit!r}: cannot be that of {ours!r}, which is in {named}; write {wanted}.")
 
 
 @cache
