@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+import os
 import re
+import signal
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from bodyplan.show.beside import Beside, beside, check_unit, metrics_in, scale_o
 from bodyplan.show.dimensions import si_unit
 from bodyplan.show.grids import grid_plot, grid_section, in_words
 from bodyplan.show.outcome import Grid, GridPoint
+from bodyplan.show.sections import comparison
 
 MISSION = """title = "t"
 [robot]
@@ -120,6 +123,29 @@ def test_a_point_that_fails_is_a_row_with_its_reason():
     assert "1 of 2 runs have no figures" in " ".join(in_words(grid, "m"))
     text = grid_section(grid, "m")
     assert tight.status in text and not re.search(r"\b(nan|None)\b", text)
+
+
+def killed(*arguments):
+    """What a worker does that the system stops."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_workers_that_the_system_stops_are_rows_with_their_reason(monkeypatch):
+    """Their processes are killed: what this process works out itself is there, the rest says why it is not."""
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(job, "compare_mission", killed)
+    monkeypatch.setattr(job, "grid_point", killed)
+    text = MISSION.replace('title = "t"', 'title = "t"\ncompare = ["concertina-paper"]')
+    outcome = job.work(parse(text + GRID + PAPER.replace("/ plan.speed", "/ concertina-paper:trial.speed_m_s")))
+    assert outcome.trial.ok
+    (other,) = outcome.others
+    assert (other.name, other.status, other.ratio) == ("concertina-paper", "lost", None) and "memory" in other.reason
+    assert other.title == load_mission("concertina-paper").title
+    assert [(p.value, p.status) for p in outcome.grid.points] == [(0.05, "lost"), (0.3, "lost")]
+    assert outcome.paper[0].value is not None and outcome.paper[1].value is None
+    assert "memory" in comparison(outcome) and "memory" in grid_section(outcome.grid, "m")
+    Metrics.model_validate(json.loads(json.dumps(metrics_of(outcome).model_dump(), allow_nan=False)))
 
 
 def test_other_missions_run_beside_this_one():
@@ -322,7 +348,11 @@ def test_units_are_those_of_the_house():
     "old,new,words",
     [
         ('unit = "mm/s"', 'unit = "mmm/s"', ["mmm/s", "mm/s"]),
-        ('unit = "mm/s"', 'unit = "deg"', [f"line {len(MISSION.splitlines()) + 4}:", "row 'speed'", "'deg'", "trial.speed_m_s", "m/s"]),
+        (
+            'unit = "mm/s"',
+            'unit = "deg"',
+            [f"line {len(MISSION.splitlines()) + 4}:", "row 'speed'", "'deg'", "trial.speed_m_s", "m/s"],
+        ),
         ('unit = "mm/s"', 'unit = "furlong"', ["row 'speed'", "'furlong'", "m/s"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "trial.sped"\n', ["sped", "Did you mean 'speed_m_s'", "advance_ratio"]),
         ('ours = "trial.speed_m_s"\n', 'ours = "speed"\n', ["speed", "plan.NAME", "A / B"]),

@@ -377,6 +377,14 @@ def _summary(result: Result) -> None:
                 for o in (outcome.itself, *outcome.others)
             ],
         )
+    lost = [f"{o.name}: {o.status}, {o.reason}" for o in outcome.others if o.reason]
+    if outcome.grid is not None:
+        bad = [p for p in outcome.grid.points if p.reason]
+        lost += [f"{p.mission} at {outcome.grid.label} = {p.value:.4g}: {p.status}, {p.reason}" for p in bad]
+    for text in lost[:3]:
+        typer.echo(f"  no figures {text}")
+    if len(lost) > 3:
+        typer.echo(f"             and {len(lost) - 3} more in the report")
     typer.echo(f"\n  report     {result.report}")
 
 

@@ -8,6 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -34,6 +35,11 @@ if TYPE_CHECKING:
 
 #: fewest samples of a cycle: fewer would not show the motion, whatever dt says
 LEAST_SAMPLES = 100
+#: why a run in another process has no result: nothing but its end is known
+LOST = (
+    "the process that was to run it has ended (stopped by the system, for want of memory perhaps; a script that calls "
+    'bodyplan needs if __name__ == "__main__")'
+)
 #: how a caller hears of progress: (what is being done, part done in [0, 1])
 Progress = Callable[[str, float], None]
 
@@ -152,6 +158,16 @@ def _plan_of(text: str, name: str) -> Motion:
     return plan_mission(alone(text, name))
 
 
+def _begun(pool: ProcessPoolExecutor, job: tuple[Any, ...]) -> Callable[[], Any]:
+    """The result of a call in ``pool``, asked for by a call; it raises BrokenProcessPool where a process has ended."""
+    try:
+        future: Future[Any] = pool.submit(*job)
+    except BrokenProcessPool as error:  # the first process has ended before all calls were given out
+        future = Future()
+        future.set_exception(error)
+    return future.result
+
+
 @contextmanager
 def _others(jobs: Sequence[tuple[Any, ...]]) -> Iterator[list[Callable[[], Any]]]:
     """Calls (function, arguments ...) under way in other processes where there is a second core; each result is
@@ -163,9 +179,8 @@ def _others(jobs: Sequence[tuple[Any, ...]]) -> Iterator[list[Callable[[], Any]]
     # the caller works too; in a long list it is done early
     workers = min(len(jobs), cores - 1 if len(jobs) < 2 * cores else cores)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        waiting: list[Future[Any]] = [pool.submit(*job) for job in jobs]
         try:
-            yield [future.result for future in waiting]
+            yield [_begun(pool, job) for job in jobs]
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -192,10 +207,16 @@ def work(mission: Mission, *, simulate: bool = True, compare: bool = True, progr
             trial = simulate_mission(mission, motion, lambda part: progress("simulating", part))
             for i, result in enumerate(results[: len(names)]):
                 progress("comparing", i / len(names))
-                others.append(result())
+                try:
+                    others.append(result())
+                except BrokenProcessPool:
+                    others.append(Comparison.lost(names[i], load_mission(names[i]).title, LOST))
             for i, result in enumerate(results[len(names) :]):
                 progress("grid", i / len(cells))
-                points.append(result())
+                try:
+                    points.append(result())
+                except BrokenProcessPool:
+                    points.append(GridPoint(cells[i][1], cells[i][3], "lost", LOST))
     return Outcome(
         mission.name,
         mission.title,

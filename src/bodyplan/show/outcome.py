@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 class Comparison:
     """Figures of another mission, run the same way: advance executed / planned, speeds in m/s, torque in N m, slip
     angle in rad, executed over no-slip speed, advance along the body's own heading over planned; ``figures``: every
-    number of :func:`figures_of`."""
+    number of :func:`figures_of`. ``status`` "lost", with the ``reason``, where it could not be run."""
 
     name: str
     title: str
     ratio: float | None
     speed: float | None
     planned_speed: float | None
-    peak_joint_rate: float
+    peak_joint_rate: float | None
     peak_torque: float | None
     cost_of_transport: float | None
     status: str
@@ -39,6 +39,12 @@ class Comparison:
     no_slip_ratio: float | None = None
     forward_ratio: float | None = None
     figures: Mapping[str, float | None] = field(default_factory=dict)
+    reason: str = ""
+
+    @classmethod
+    def lost(cls, name: str, title: str, reason: str) -> Comparison:
+        """A mission that could not be run: no figures, but why."""
+        return cls(name, title, None, None, None, None, None, None, "lost", reason=reason)
 
     @classmethod
     def of(cls, name: str, title: str, motion: Motion, trial: Trial | None) -> Comparison:
@@ -87,7 +93,7 @@ def no_slip_ratio(motion: Motion, trial: Trial | None) -> float | None:
 @dataclass(frozen=True)
 class GridPoint:
     """One mission at one value of a grid: figures as those of a :class:`Comparison`; ``status`` "ok", that of the plan
-    or of the physics, or "refused", with the ``reason``."""
+    or of the physics, "refused", "failed" or "lost", with the ``reason``."""
 
     mission: str
     value: float

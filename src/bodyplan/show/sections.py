@@ -82,8 +82,9 @@ def comparison(outcome: Outcome) -> str:
 
 def _compared(other: Comparison, mine: bool, slips: bool, paced: bool) -> tuple[str, ...]:
     name = f"<b>{esc(other.name)}</b> (this one)" if mine else esc(other.name)
+    status = f"{other.status}: {other.reason}" if other.reason else other.status
     return (
-        name + ("" if other.status == "ok" else f" <small>({esc(other.status)})</small>"),
+        name + ("" if other.status == "ok" else f" <small>({esc(status)})</small>"),
         esc(other.title),
         percent(other.ratio),
         figure(other.speed, "m/s"),
