@@ -153,9 +153,21 @@ def test_other_missions_run_beside_this_one():
     scaly = MISSION + "friction = { forward = 0.1, backward = 0.1, sideways = 0.3 }\n"
     sideways = GRID.replace('"simulate.friction"', '"simulate.friction.sideways"')
     assert parse(scaly + sideways).grid.key == "simulate.friction.sideways"
-    with pytest.raises(bp.InputError, match=r"mission concertina.*simulate\.friction"):
-        # the skin of the other mission is not scaly
+    # the skin of the other mission is not scaly, or this one's is not
+    lacks = (
+        r"m\.toml, line \d+: grid\.key = 'simulate\.friction\.sideways': mission {} has no table simulate\.friction "
+    )
+    with pytest.raises(
+        bp.InputError,
+        match=lacks.format("concertina") + r"in which sideways could vary \(simulate\.friction\.forward is m",
+    ):
         parse(scaly + sideways + 'missions = ["concertina"]\n')
+    with pytest.raises(
+        bp.InputError, match=lacks.format("m") + r"in which sideways could vary: simulate\.friction is 0\.2"
+    ):
+        parse(MISSION + "friction = 0.2\n" + sideways)
+    with pytest.raises(bp.InputError, match=lacks.format("m") + r"in which sideways could vary \(simulate"):
+        parse(MISSION + sideways)
     cells = job._cells(parse(text))
     assert [(name, value) for _, name, _, value in cells] == [
         ("m", 0.05),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -156,17 +157,42 @@ def _check_grid(source: _Source, grid: Grid, data: dict[str, Any], folder: Path 
         raise InputError(f"{source.at(('grid', 'key'))}: grid.key = {grid.key!r}: nothing to vary; name a number.")
     for value in grid.values:
         item = f"{grid.key}={value!r}"
-        try:
+
+        def here(item: str = item) -> None:
             changed = copy.deepcopy(data)
             override(changed, item)
             there = _Source(source.text, source.where, (*source.overrides, item))
             model = there.validate(MissionModel, changed, ())
             if model_section(grid.key) in SECTIONS:
                 _build(there, model, model_section(grid.key), changed, folder)
-            for other in grid.missions:
-                alone(ready[other], other, (item,))
-        except InputError as error:
-            raise InputError(f"{source.at(('grid', 'key'))}: grid: {error}") from error
+
+        at = f"{source.at(('grid', 'key'))}: grid.key = {grid.key!r}"
+        _taken(at, grid.key, f"mission {name}", data, here)
+        for other in grid.missions:
+            _taken(
+                at,
+                grid.key,
+                f"mission {other}",
+                tomllib.loads(ready[other]),
+                partial(alone, ready[other], other, (item,)),
+            )
+
+
+def _taken(at: str, key: str, mission: str, data: Mapping[str, Any], attempt: Callable[[], Any]) -> None:
+    """Attempt to change a field of ``mission``; the error says what is missing there."""
+    try:
+        attempt()
+    except InputError as error:
+        table, _, field = key.rpartition(".")
+        found: Any = data
+        for part in table.split(".") if table else ():
+            found = found.get(part.strip()) if isinstance(found, Mapping) else None
+        if isinstance(found, Mapping):
+            raise InputError(f"{at}: {mission} cannot take it: {error}") from error
+        said = f"{mission} has no table {table} in which {field} could vary"
+        if found is not None:
+            said += f": {table} is {found!r} there"
+        raise InputError(f"{at}: {said} ({str(error).rpartition(': ')[2].rstrip('.')}).") from error
 
 
 def model_section(key: str) -> str:
