@@ -1,5 +1,6 @@
 """bodyplan fit as a user meets it: curves by name, points and table; the numbers of bp.fit; files; refusals."""
 
+import html
 import json
 import re
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ from bodyplan.cli import app
 from bodyplan.missions.curve_input import READY, load_curve
 from bodyplan.show.fit_outcome import FitOutcome, axes_of
 from bodyplan.show.fit_page import fit_page
+from bodyplan.show.fitted_plots import angles as angles_plot
 from bodyplan.show.fitted_plots import overlay
 
 FIT_FILES = {"fit.html", "fit.png", "fit.svg", "angles.csv", "fit.json"}
@@ -211,6 +213,83 @@ def test_convergence_has_its_table_figure_and_orders(tmp_path):
     assert "arc" in result.output and "order" in result.output
 
 
+def shown(out):
+    """The page as one reads it: without scripts, tags as spaces."""
+    return re.sub(
+        r"<[^>]*>", " ", re.sub(r"<script.*?</script>", "", (out / "fit.html").read_text("utf-8"), flags=re.S)
+    )
+
+
+def test_axes_that_the_robot_lacks_are_warned_of(tmp_path):
+    """A spiral bends about both axes by its curvature, in the frame that does not roll."""
+    result = bodyplan("fit", "spiral", "--axes", "yaw", "--joints", "5", "--out", str(tmp_path / "f"))
+    assert result.exit_code == 0
+    (bend,) = re.findall(
+        r"  warning    the curve bends about pitch \(by up to (\S+) rad/m\), but the robot", result.output
+    )
+    assert float(bend) == pytest.approx(12.0, rel=5e-3)
+    assert "Warning: the curve bends about pitch (by up to" in shown(tmp_path / "f")
+    found = json.loads((tmp_path / "f" / "fit.json").read_text())
+    assert found["status"] == "ok" and len(found["warnings"]) == 1
+    wave = FitOutcome.of("s", bp.Serpenoid(np.pi / 3), joints=3, axes="pitch")
+    # the steepest place of theta = alpha cos(2 pi s): eq. (1) of paper acm has kappa_y there
+    assert wave.warnings == ("the curve bends about yaw (by up to 6.58 rad/m), but the robot has no joints that do",)
+    assert FitOutcome.of("s", bp.Serpenoid(1.0), joints=3, axes="yaw").warnings == ()
+    assert FitOutcome.of("s", bp.Serpenoid(0.0), joints=3, axes="pitch").warnings == ()
+    assert FitOutcome.of("s", bp.Spiral(), joints=3).warnings == ()
+
+
+def test_a_gain_against_a_rule_beyond_the_limits_says_so(tmp_path):
+    arguments = ["--method", "optimal", "--joints", "5", "--limit"]
+    words = "the rule's angles are beyond the limits"
+    tight = bodyplan("fit", "serpenoid", *arguments, "20 deg", "--out", str(tmp_path / "f"))
+    assert tight.exit_code == 0
+    (gain, said) = re.search(r"  gain       (\S+) of the error of the paper's rule(.*)", tight.output).groups()
+    assert float(gain) > 1.0 and said == f"; {words}"
+    assert words.replace("'", "’") in shown(tmp_path / "f")
+    wide = bodyplan("fit", "serpenoid", *arguments, "80 deg", "--out", str(tmp_path / "g"))
+    assert float(re.search(r"gain       (\S+) of", wide.output)[1]) < 1.0 and "beyond" not in wide.output
+    assert "beyond the limits" not in shown(tmp_path / "g")
+
+
+def test_straight_links_have_one_joint_less(tmp_path):
+    result = bodyplan("fit", "serpenoid", "--joint", "straight", "--out", str(tmp_path / "f"))
+    assert "serpenoid by 10 straight links with 9 joints" in result.output
+    text = shown(tmp_path / "f").replace("\u00a0", " ")
+    assert "A mechanism of 10 straight links with 9 joints (yaw)" in text and "10 joints" not in text
+    turns = FitOutcome.of("s", bp.Spiral(), joints=5, joint="straight")
+    assert turns.mechanism == "10 straight links with 9 joints" and turns.fit.robot.n == 9
+    assert FitOutcome.of("s", bp.Spiral(), joints=1).title == "s by 1 arc-shaped joint"
+
+
+def test_rounding_is_no_angle(tmp_path):
+    """A serpenoid turns about yaw alone: pitch angles are 0 and shown so."""
+    result = bodyplan("fit", "serpenoid", "--axes", "universal", "--joints", "4", "--out", str(tmp_path / "f"))
+    assert re.search(r"pitch2 +0\.000000\n", result.output) and "-0.000000" not in result.output
+    text = shown(tmp_path / "f")
+    assert "×10" not in text[text.index("virtual joint at the tail") : text.index("Beside other mechanisms")]
+    names = ["yaw1", "pitch1", "yaw2"]
+    made = angles_plot(names, np.array([0.5, -4e-16, 1e-10]), np.full((3, 2), np.inf))
+    assert {x: y for trace in made["data"] for x, y in zip(trace["x"], trace["y"], strict=True)} == {
+        "yaw1": pytest.approx(28.6479, rel=1e-5),
+        "pitch1": 0.0,
+        "yaw2": pytest.approx(np.degrees(1e-10), rel=1e-5),
+    }
+    # joints in the order of the body, as in the PNG
+    assert made["layout"]["xaxis"]["categoryarray"] == names
+
+
+def test_mechanisms_that_cannot_be_made_say_why(tmp_path):
+    result = bodyplan("fit", "serpenoid", "--joints", "1", "--out", str(tmp_path / "f"))
+    assert result.exit_code == 0, result.output
+    rows = json.loads((tmp_path / "f" / "fit.json").read_text())["mechanisms"]
+    assert [r["mechanism"] for r in rows] == ["straight", "straight", "arc", "arc", "double", "double"]
+    for row in rows:
+        assert (row["status"] == "refused") == (row["mechanism"] == "straight") == (row["error"] is None)
+    assert rows[0]["reason"] and f"straight cannot be made: {rows[0]['reason']}" in result.output
+    assert f"refused: {rows[0]['reason']}" in shown(tmp_path / "f")
+
+
 # --- what is refused or fails
 
 
@@ -245,6 +324,8 @@ def test_a_curve_that_ends_is_a_status(tmp_path):
         (["serpenoid", "--p", "0.5"], ["p", "0.5"]),
         (["serpenoid", "--p", "nan"], ["p"]),
         (["serpenoid", "--end-link", "0.5", "--joint", "double"], ["end_link", "0.5"]),
+        (["serpenoid", "--end-link", "0.5", "--joint", "arc"], ["end_link", "0.5"]),
+        (["serpenoid", "--end-link", "0", "--joint", "straight"], ["end_link", "0"]),
         (["serpenoid", "--limit", "-1 deg"], ["limit"]),
         (["serpenoid", "--limit", "1 kg"], ["limit", "1 kg"]),
         (["serpenoid", "--limit", "75"], ["limit: must be at most half a turn", "75 rad", "75 deg"]),

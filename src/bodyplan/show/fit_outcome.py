@@ -9,15 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from bodyplan.arrays import number, whole
+from bodyplan.arrays import Array, number, whole
 from bodyplan.curves.base import BodyCurve
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.fitting import Fit, fit
+from bodyplan.fitting.fits import AT_LIMIT
+from bodyplan.fitting.mechanism import AXIS_NAMES, mechanism
 from bodyplan.robot import Robot, snake
 from bodyplan.show.fitted import Drawn
+from bodyplan.show.text import counted, settled
 
 KINDS = ("straight", "arc", "double")
 RULES = ("paper", "optimal")
+#: share of its largest curvature up to which a curve does not bend about an axis
+FLAT = 1e-9
 MOST_JOINTS = 200
 #: joints up to which the others are fitted optimally too: the work grows as the square of the joints
 MOST_OPTIMAL = 40
@@ -25,16 +30,18 @@ MOST_OPTIMAL = 40
 
 @dataclass(frozen=True)
 class FitRow:
-    """One mechanism by one rule: E_nm, its quadrature error, the largest distance m, degrees of freedom, status."""
+    """One mechanism by one rule: degrees of freedom, E_nm, its quadrature error, the largest distance m, status. A
+    mechanism that cannot be made is "refused", with the ``reason`` and no figures."""
 
     mechanism: str
     rule: str
-    joints: int
-    error: float
-    quadrature_error: float
-    max_distance: float
+    joints: int | None
+    error: float | None
+    quadrature_error: float | None
+    max_distance: float | None
     status: str
     mine: bool
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +91,7 @@ class FitOutcome:
         if limit is not None and number(limit, "limit", above=0.0) > np.pi:
             said = f"limit: must be at most half a turn, 3.14159 rad, got {limit:.6g} rad"
             raise InputError(f'{said}; degrees need "deg", as in "75 deg".')
+        number(end_link, "end_link", above=0.0, below=0.5)
         flat = axes_of(curve) if axes is None else axes
 
         def fitted(kind: str, rule: str) -> Fit:
@@ -99,7 +107,8 @@ class FitOutcome:
             progress("comparing", i / len(pairs))
             try:
                 one = mine if (kind, rule) == asked else fitted(kind, rule)
-            except InputError:  # one straight link has no joint
+            except InputError as error:  # one straight link has no joint
+                rows.append(FitRow(kind, rule, None, None, None, None, "refused", False, str(error)))
                 continue
             rows.append(
                 FitRow(kind, rule, one.robot.n, float(one.error), float(one.quadrature_error), float(one.max_distance),
@@ -124,12 +133,34 @@ class FitOutcome:
         """The fit along the body, for pictures."""
         return Drawn.of(self.fit)
 
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know of the fit: the axes that the curve bends about and the robot cannot."""
+        bends = _bends(self.curve, float(self.fit.start), float(self.fit.start) + self.fit.length)
+        least = FLAT * float(bends.max())
+        return tuple(
+            f"the curve bends about {name} (by up to {bends[axis]:.3g} rad/m), but the robot has no joints that do"
+            for axis, name in enumerate(AXIS_NAMES)
+            if axis not in mechanism(self.fit.robot).axes and bends[axis] > least
+        )
+
+    @property
+    def beyond(self) -> bool:
+        """True where the paper's rule goes beyond the joint limits, which the optimal angles may not."""
+        return bool(np.any(self.fit.paper.excess > AT_LIMIT))
+
     @property
     def title(self) -> str:
         """ "serpenoid by 10 arc-shaped joints"."""
-        what = {"straight": "straight links", "arc": "arc-shaped joints", "double": "double joints"}[self.joint]
-        links = self.joints if self.joint != "straight" else len(self.fit.robot.contacts)
-        return f"{self.name} by {links} {what}"
+        return f"{self.name} by {self.mechanism}"
+
+    @property
+    def mechanism(self) -> str:
+        """ "10 arc-shaped joints", "10 straight links with 9 joints"."""
+        if self.joint == "straight":
+            links = len(self.fit.robot.contacts)
+            return f"{counted(links, 'straight link')} with {counted(links - 1, 'joint')}"
+        return counted(self.joints, {"arc": "arc-shaped joint", "double": "double joint"}[self.joint])
 
     def to_dict(self) -> dict[str, Any]:
         """JSON types: everything that was found."""
@@ -143,6 +174,7 @@ class FitOutcome:
             "method": fitted.method,
             "p": fitted.p,
             "status": fitted.status,
+            "warnings": list(self.warnings),
             "error": float(fitted.error),
             "quadrature_error": float(fitted.quadrature_error),
             "max_distance_m": float(fitted.max_distance),
@@ -165,12 +197,18 @@ STRAIGHT = (
 
 def axes_of(curve: BodyCurve) -> str:
     """ "yaw" or "pitch" for a curve that bends about that axis alone, else "universal"."""
-    s = np.unique(np.concatenate([np.linspace(0.0, curve.length, 1001), curve.breaks]))
-    bends = curve.untwisted().shape(s)
-    size = max(float(np.abs(bends.kappa_p).max()), float(np.abs(bends.kappa_y).max()))
-    if float(np.abs(bends.kappa_p).max()) <= 1e-9 * size:
+    pitch, yaw = _bends(curve, 0.0, curve.length)
+    least = FLAT * max(pitch, yaw)
+    if pitch <= least:
         return "yaw"
-    return "pitch" if float(np.abs(bends.kappa_y).max()) <= 1e-9 * size else "universal"
+    return "pitch" if yaw <= least else "universal"
+
+
+def _bends(curve: BodyCurve, start: float, end: float) -> Array:
+    """Largest curvatures (pitch, yaw) rad/m between two places, in the frame that does not roll."""
+    inside = curve.breaks[(curve.breaks > start) & (curve.breaks < end)]
+    bends = curve.untwisted().shape(np.unique(np.concatenate([np.linspace(start, end, 1001), inside])))
+    return np.array([np.abs(bends.kappa_p).max(), np.abs(bends.kappa_y).max()])
 
 
 def mechanism_axes(kind: str, axes: str, default: bool) -> str:
@@ -189,6 +227,20 @@ def mechanism_of(
     return snake(links, length / links, kind, axes=axes, limits=limits, **more)
 
 
+def in_degrees(angles: Any) -> list[float]:
+    """Angles rad in degrees, without the rounding of zeros."""
+    return [settled(float(x)) for x in np.degrees(np.asarray(angles, dtype=float))]
+
+
 def saturated(fitted: Fit) -> list[str]:
     """Joints at or beyond their limits, in words."""
     return [f"{name} (by {np.degrees(by):.3g}°)" if by > 0.0 else name for name, by in fitted.limits.items()]
+
+
+def refused(outcome: FitOutcome) -> dict[str, list[str]]:
+    """Why mechanisms could not be made -> their names."""
+    out: dict[str, list[str]] = {}
+    for row in outcome.rows:
+        if row.reason and row.mechanism not in out.setdefault(row.reason, []):
+            out[row.reason].append(row.mechanism)
+    return out

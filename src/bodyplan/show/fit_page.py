@@ -17,7 +17,20 @@ from bodyplan.show.fit_outcome import STRAIGHT, FitOutcome, saturated
 from bodyplan.show.fitted_figures import draw_angles, draw_distance, draw_overlay, draw_turning
 from bodyplan.show.layout import layout, line
 from bodyplan.show.series import SERIES
-from bodyplan.show.text import counted, degrees, esc, figure, folded, pairs, percent, plain, plot, section, table, words
+from bodyplan.show.text import (
+    NOTHING,
+    degrees,
+    esc,
+    figure,
+    folded,
+    pairs,
+    percent,
+    plain,
+    plot,
+    section,
+    table,
+    words,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -89,7 +102,7 @@ def fit_page(outcome: FitOutcome) -> str:
         section("turning", "Turning along the body", plot("turning", turning)),
         section("distance", "Distance from the curve", plot("distance")),
         section("angles", "Joint angles", plot("angles") + _angle_table(outcome)),
-        section("mechanisms", f"Other mechanisms of {counted(outcome.joints, 'joint')}", _mechanisms(outcome)),
+        section("mechanisms", "Beside other mechanisms", _mechanisms(outcome)),
     ]
     if convergence is not None:
         parts.append(section("convergence", "Over the number of joints", plot("convergence") + _orders(convergence)))
@@ -107,17 +120,19 @@ def _head(outcome: FitOutcome) -> str:
         ("Largest angle", degrees(float(np.abs(np.asarray(found.q)).max())), limits_in_words(outcome)),
     ]  # fmt: skip
     if found.method == "optimal":
-        tiles.append(("Beside the paper’s rule", percent(float(found.gain)), "of its error"))
+        beyond = "; the rule’s angles are beyond the limits" if outcome.beyond else ""
+        tiles.append(("Beside the paper’s rule", percent(float(found.gain)), f"of its error{beyond}"))
     cells = "".join(
         f'<div class="tile"><dt>{esc(name)}</dt><dd>{value}<small>{esc(note)}</small></dd></div>'
         for name, value, note in tiles
     )
     status = "" if outcome.ok else f'<p class="bad">Status: {esc(found.status)}</p>'
     about = (
-        f"A mechanism of {counted(outcome.joints, 'joint')} ({esc(outcome.joint)}, {esc(outcome.axes)}) on "
+        f"A mechanism of {esc(outcome.mechanism)} ({esc(outcome.axes)}) on "
         f"{figure(length, 'm')} of the curve, by {rule}; E_nm is the mean distance between the two as a share of the "
         "length."
     )
+    status += "".join(f'<div class="warning">Warning: {esc(text)}</div>' for text in outcome.warnings)
     return (
         f'<header><p class="kicker">bodyplan fit</p><h1>{esc(outcome.title.capitalize())}</h1><p>{about}</p></header>'
         f'{status}<dl class="tiles">{cells}</dl>'
@@ -146,12 +161,12 @@ def _mechanisms(outcome: FitOutcome) -> str:
         (
             f"<b>{esc(row.mechanism)}</b>" if row.mine else esc(row.mechanism),
             esc(row.rule),
-            str(row.joints),
+            NOTHING if row.joints is None else str(row.joints),
             figure(row.error, digits=5),
             figure(row.quadrature_error, digits=2),
-            percent(row.error / best[row.mechanism]) if best.get(row.mechanism) else "",
+            percent(row.error / beside) if row.error is not None and (beside := best.get(row.mechanism)) else "",
             figure(row.max_distance, "m"),
-            esc(row.status),
+            esc(f"{row.status}: {row.reason}" if row.reason else row.status),
         )
         for row in outcome.rows
     ]

@@ -11,6 +11,7 @@ from bodyplan.arrays import Array
 from bodyplan.show.fitted import CURVE, MECHANISM, VIEWS, Drawn
 from bodyplan.show.layout import AXIS, label, layout, line
 from bodyplan.show.series import SERIES, compact
+from bodyplan.show.text import settled
 
 
 def overlay(drawn: Drawn) -> dict[str, Any]:
@@ -76,8 +77,9 @@ def angles(names: Sequence[str], q: Array, limits: Array) -> dict[str, Any]:
     """Joint angles in degrees by joint, pitch and yaw apart, with limits where there are any."""
     data: list[dict[str, Any]] = []
     shown = [label(name) for name in names]
+    tidy = np.array([settled(float(angle)) for angle in np.degrees(q)])
     for i, (group, chosen) in enumerate(by_axis(names)):
-        x, y = [shown[k] for k in chosen], compact(np.degrees(q[chosen]), 6)
+        x, y = [shown[k] for k in chosen], compact(tidy[chosen], 6)
         data.append({"type": "bar", "x": x, "y": y, "name": group, "marker": {"color": SERIES[i]},
                      "hovertemplate": "%{x}: %{y}°<extra></extra>"})  # fmt: skip
     for side in (0, 1):
@@ -87,7 +89,9 @@ def angles(names: Sequence[str], q: Array, limits: Array) -> dict[str, Any]:
                          "marker": {"symbol": "line-ew", "size": 10, "line": {"color": "#b3261e", "width": 2}},
                          "showlegend": side == 0, "hoverinfo": "skip"})  # fmt: skip
     made = layout("joint", "angle (deg)", 300, bargap=0.25)
-    made["xaxis"].update({"type": "category", "tickfont": {"size": 10}})
+    # else plotly would put all joints of one axis before those of the other
+    order = {"categoryorder": "array", "categoryarray": shown}
+    made["xaxis"].update({"type": "category", "tickfont": {"size": 10}, **order})
     return {"data": data, "layout": made}
 
 

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 NOTHING = "–"
+#: deg: an angle below this is rounding
+NO_ANGLE = 1e-9
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 #: last word of a quantity's name -> its SI unit, for numbers that come without one
@@ -52,9 +54,14 @@ def percent(value: float | None) -> str:
     return figure(None if value is None else 100.0 * value, "%", 3, zeros=True)
 
 
+def settled(degrees: float) -> float:
+    """An angle in degrees; 0 where it is rounding."""
+    return 0.0 if abs(degrees) < NO_ANGLE else degrees
+
+
 def degrees(angle: float | None, digits: int = 3) -> str:
     """An angle in rad as degrees."""
-    return figure(None if angle is None else math.degrees(angle), "°", digits, zeros=True)
+    return figure(None if angle is None else settled(math.degrees(angle)), "°", digits, zeros=True)
 
 
 def unit_of(name: str) -> str:
