@@ -215,9 +215,8 @@ def test_convergence_has_its_table_figure_and_orders(tmp_path):
 
 def shown(out):
     """The page as one reads it: without scripts, tags as spaces."""
-    return re.sub(
-        r"<[^>]*>", " ", re.sub(r"<script.*?</script>", "", (out / "fit.html").read_text("utf-8"), flags=re.S)
-    )
+    text = re.sub(r"<script.*?</script>", "", (out / "fit.html").read_text("utf-8"), flags=re.S)
+    return html.unescape(re.sub(r"<[^>]*>", " ", text))
 
 
 def test_axes_that_the_robot_lacks_are_warned_of(tmp_path):

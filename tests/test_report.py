@@ -6,6 +6,7 @@ import base64
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,6 +22,7 @@ from bodyplan.show.figures import write_figures
 from bodyplan.show.keyframes import SIDE, TOP, view_of
 from bodyplan.show.outcome import five_point_gaps
 from bodyplan.show.playback import MOST_FRAMES, Playback, centre_of_mass
+from bodyplan.show.remarks import gathered
 from bodyplan.show.scene import scene
 from bodyplan.show.series import compact, crest, loads
 from bodyplan.show.shapes import bones, extent, outline, scenery
@@ -39,6 +41,41 @@ from report_cases import (
     snake_trial,
     stick,
 )
+
+# --- warnings of the physics
+
+
+def test_the_same_trouble_of_many_joints_is_one_line() -> None:
+    pytest.importorskip("mujoco")
+    gait = bp.Concertina(body_modules=2, gamma_max=0.8, stretch_time=1.0, contraction="mirror")
+    times = bp.times(0.0, 2.0, dt=0.05)
+    weak = bp.plan(bp.snake(8, 0.1, effort=0.02), gait, bp.Corridor(0.16, friction=0.3), times)
+    trial = bp.simulate(weak, cycles=1, settle=0.2, ramp=0.0, dt=2e-3, servo=(20.0, 0.4))
+    single = [text for text in trial.warnings if "at its effort" in text]
+    assert len(single) > 3
+    (line,) = [text for text in gathered(trial, weak.robot) if "effort" in text]
+    shares = {re.findall(r"'(.*?)'", text)[0]: float(re.findall(r"for (\S+) %", text)[0]) for text in single}
+    assert line.startswith(f"{len(single)} servos are at their effort 0.02, most: ")
+    named = {name: float(share) for name, share in re.findall(r"(\w+) \((\S+) % of the time\)", line)}
+    assert len(named) == 3 and all(shares[name] == share for name, share in named.items())
+    assert min(named.values()) >= max(share for name, share in shares.items() if name not in named)
+
+
+def test_joints_at_their_limits_are_one_line_with_the_farthest() -> None:
+    robot = bp.snake(5, 0.1, limits=(-0.5, 0.5))
+    q = np.zeros((2, 4))
+    q[1] = 0.51, -0.53, 0.1, 0.52
+    effort = "servo of joint 'yaw1' is at its effort 1 for 2.0 % of the time"
+    texts = [f"joint 'yaw{i}' is pushed against its limit" for i in (1, 2, 4)]
+    trial = replace(snake_trial(), q=q, warnings=("a", *texts, effort))
+    assert gathered(trial, robot) == [
+        "a",
+        "3 joints are pushed against their limits, "
+        "yaw2 (by 1.72\u00a0°), yaw4 (by 1.15\u00a0°) and yaw1 (by 0.573\u00a0°)",
+        effort,
+    ]
+    assert gathered(replace(trial, warnings=texts[:1]), robot) == texts[:1]
+
 
 # --- text
 

@@ -363,7 +363,9 @@ def _summary(result: Result) -> None:
                 typer.echo(f"             {row.no_slip_ratio:.1%} of the speed without slip{own}{angle}")
         else:
             _say(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
-        warnings += trial.warnings
+        from bodyplan.show.remarks import gathered
+
+        warnings += gathered(trial, outcome.motion.robot)
     for warning in warnings[:5]:
         typer.echo(f"  warning    {warning}")
     if len(warnings) > 5:

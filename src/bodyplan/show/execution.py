@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from bodyplan.robot.model import Robot
 from bodyplan.show.outcome import Outcome, no_slip_ratio
 from bodyplan.show.playback import Playback
+from bodyplan.show.remarks import gathered
 from bodyplan.show.stages import stage_rows, worst
 from bodyplan.show.text import (
     counted,
@@ -64,13 +66,15 @@ def execution(outcome: Outcome, playback: Playback) -> str:
             "the replay shows the run up to there.</p>"
         )
     head = ("", "planned", "executed", "executed / planned")
-    out += _warnings(trial) + table(head, _figures(trial, playback), kind="pairs", numbers=(1, 2, 3))
+    out += _warnings(trial, outcome.motion.robot) + table(
+        head, _figures(trial, playback), kind="pairs", numbers=(1, 2, 3)
+    )
     out += advance + _losses(trial, playback) + _load_plots(outcome)
     return section("execution", title, out + folded("Settings of the physics", pairs(_settings(trial))))
 
 
-def _warnings(trial: Trial) -> str:
-    items = [f"<li>{esc(text)}</li>" for text in trial.warnings]
+def _warnings(trial: Trial, robot: Robot) -> str:
+    items = [f"<li>{esc(text)}</li>" for text in gathered(trial, robot)]
     if not items:
         return ""
     shown = f"<b>{counted(len(items), 'warning')}</b><ul>{''.join(items[:MANY])}</ul>"
