@@ -522,3 +522,7 @@ def test_any_snake_closes_its_cycle_and_stays_near(n, joint, end, alpha, waves):
     np.testing.assert_allclose(motion.q[-1], motion.q[0], atol=1e-11)
     np.testing.assert_allclose(motion.base[-1, :2], [j0(alpha) / waves, 0.0], atol=1e-9)
     assert bp.check(motion)["the cycle closes"].passed
+
+
+def test_no_steering_is_straight_on():
+    assert bp.Serpentine(bp.Serpenoid(1.0, 0.6), 0.2, steer=[]) == bp.Serpentine(bp.Serpenoid(1.0, 0.6), 0.2)

@@ -111,7 +111,9 @@ class Serpentine(Gait):
             raise UnknownNameError("base", base, BASES)
         self.base = base
         self.steer: float | tuple[tuple[float, float], ...]
-        if isinstance(steer, (list, tuple)):
+        if isinstance(steer, (list, tuple)) and not steer:
+            self.steer = 0.0  # no change: straight on
+        elif isinstance(steer, (list, tuple)):
             self.steer = tuple(
                 (to_si(a, "time", "steer"), to_si(b, "curvature", "steer")) for a, b in _pairs(steer, "steer")
             )
