@@ -93,7 +93,7 @@ def _steps(alpha: float, lift: float) -> int:
 
 def _none(alpha: float, lift: float) -> InputError:
     return InputError(
-        f"c1: no value that keeps the curve level with alpha {alpha!r} rad and lift {lift!r} is connected with c1 = 0 at "
-        'lift = 0 (alpha near 2.405 rad, a zero of J0, or the lift too large); give c1 as a number or "paper", or '
-        "change alpha or lift."
+        f"c1: no value that keeps the curve level with alpha {alpha!r} rad and lift {lift!r} is connected with "
+        "c1 = 0 at lift = 0 (alpha near 2.405 rad, a zero of J0, or the lift too large); give c1 as a number or "
+        '"paper", or change alpha or lift.'
     )
