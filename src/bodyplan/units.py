@@ -27,7 +27,8 @@ SI_UNITS = {
 
 
 @cache
-def _registry() -> Any:
+def registry() -> Any:
+    """The pint registry that all quantities are read with; made when first needed."""
     import pint
 
     return pint.UnitRegistry(cache_folder=None)
@@ -50,7 +51,7 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
         import pint
 
         try:
-            quantity = _registry().Quantity(value)
+            quantity = registry().Quantity(value)
             # frequency: pint reads Hz as 1/s, and keeps "rad" dimensionless
             out = float(quantity.to(unit or "dimensionless").magnitude)
         except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:

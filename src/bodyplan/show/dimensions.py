@@ -9,7 +9,7 @@ from typing import Any
 
 from bodyplan.errors import InputError
 from bodyplan.show.text import unit_of
-from bodyplan.units import _registry
+from bodyplan.units import registry
 
 #: powers of the base units: {"meter": 1, "second": -1}; an angle is none of the other dimensions here
 Dimension = Mapping[str, float]
@@ -39,7 +39,7 @@ def read_unit(unit: str) -> tuple[float, Dimension]:
     import pint
 
     try:
-        quantity: Any = _registry().Quantity(1.0, unit.replace("·", "*")).to_base_units()
+        quantity: Any = registry().Quantity(1.0, unit.replace("·", "*")).to_base_units()
     except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:
         raise InputError(f"unit = {unit!r}: not a unit; {_EXAMPLES}.") from error
     return float(quantity.magnitude), {str(name): float(power) for name, power in quantity.unit_items()}
