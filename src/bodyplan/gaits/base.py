@@ -7,9 +7,16 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from bodyplan.arrays import Array
+from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
+
+
+def from_zero(t: Array) -> None:
+    """InputError for times before 0, where gaits start."""
+    if t[0] < 0.0:
+        raise InputError(f"t: the gait starts at t = 0, got {t[0]}.")
 
 
 class Gait(ABC):

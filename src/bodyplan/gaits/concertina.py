@@ -16,7 +16,7 @@ import numpy as np
 from bodyplan.arrays import Array, finite, number, whole
 from bodyplan.errors import InputError, Status, UnknownNameError
 from bodyplan.fitting.links import exact_link_length, links_on_curve
-from bodyplan.gaits.base import Gait
+from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.concertina_claims import claims_of, notes_of
 from bodyplan.gaits.cycle import ExtensionCycle
 from bodyplan.gaits.planar import PlanarSnake, level_floor, planar_snake, resting_radius
@@ -155,8 +155,7 @@ class Concertina(Gait):
 
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
         """The motion at times t (T,) s, from t = 0 on: the tail end starts at the world's origin, heading x."""
-        if t[0] < 0.0:
-            raise InputError(f"t: the gait starts at t = 0, got {t[0]}.")
+        from_zero(t)
         body = self.body(robot)
         state = body.cycle.state(t)
         snake, unit = body.snake, body.unit

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bodyplan import curves, fitting
-from bodyplan.arrays import Array, TextArray
+from bodyplan.arrays import Array, BoolArray, TextArray
 from bodyplan.curves.base import BodyCurve
 from bodyplan.errors import InputError, Status
+from bodyplan.gaits.base import Gait
 from bodyplan.gaits.placing import TOLERANCE
 from bodyplan.gaits.planar import level_floor
 from bodyplan.gaits.touching import lowest_points
 from bodyplan.ground.base import Ground
-from bodyplan.motion import Claim
+from bodyplan.motion import Claim, Motion
 from bodyplan.robot.model import Robot
 from bodyplan.spatial import compose, quaternion_from_matrix
 from bodyplan.spatial.poses import IDENTITY
@@ -31,6 +33,10 @@ TWICE, LEAST, NEAR = 2.0, 1e-4, 0.5
 FITS = 25
 #: share of the speed along the body by which its frames may move otherwise (root mean square)
 SLIP = 0.35
+#: samples of a cycle for peaks of rates
+FINE = 2000
+#: m and rad: how well a cycle closes
+CLOSED = 1e-9
 #: samples of the integration that are done again with a wider step
 PROBES = 2000
 
@@ -122,11 +128,53 @@ class Following:
             },
         )
 
+    def motion(
+        self,
+        gait: Gait,
+        ground: Ground,
+        t: Array,
+        base: Array,
+        joints: Joints,
+        *,
+        contacts: BoolArray | None,
+        **more: Any,
+    ) -> Motion:
+        """The motion of this robot; ``contacts`` (T, c) True where one touches, ``more`` as of :class:`Motion`."""
+        return Motion(
+            robot=self.robot,
+            ground=ground,
+            gait=gait.to_dict(),
+            t=t,
+            base=base,
+            q=joints.q,
+            qd=joints.qd,
+            qdd=joints.qdd,
+            status=self.within_limits(joints.q),
+            contacts=None if contacts is None else contacts.astype(np.float64),
+            **more,
+        )
+
     def within_limits(self, q: Array) -> TextArray:
         """(T,) status: "limit" where a joint is beyond its limits."""
         low, high = self.robot.limits[:, 0], self.robot.limits[:, 1]
         beyond = np.any((q < low - 1e-12) | (q > high + 1e-12), axis=1)
         return np.where(beyond, Status.LIMIT.value, Status.OK.value).astype("U24")
+
+
+def closes(period: float, advance: ArrayLike, turn: ArrayLike) -> Claim:
+    """The claim that the cycle closes: after ``period`` s the base is moved as p -> R(turn) p + advance."""
+    data = {"period": period, "advance": advance, "turn": turn, "tolerance": CLOSED}
+    return Claim("periodic", "the cycle closes", data)
+
+
+def farthest_in_cycle(fit_at: Callable[[float], Any], period: float) -> float:
+    """m: largest distance that the fits of a cycle leave to their curves."""
+    return max(float(fit_at(float(t)).max_distance) for t in np.linspace(0.0, period, FITS))
+
+
+def fit_facts(fit: Any) -> dict[str, float]:
+    """How well a fit matches its curve, as facts of a plan."""
+    return {"fit_error": float(fit.error), "fit_distance": float(fit.max_distance)}
 
 
 def in_time(bends: Bends, speed: Array, acceleration: Array) -> Joints:

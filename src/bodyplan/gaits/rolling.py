@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,11 +13,15 @@ from bodyplan.arrays import Array, number
 from bodyplan.curves.constant import Constant
 from bodyplan.curves.spiral import Spiral
 from bodyplan.errors import InputError, UnknownNameError
-from bodyplan.gaits.base import Gait
+from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.following import (
-    FITS,
+    CLOSED,
+    FINE,
     Following,
     Joints,
+    closes,
+    farthest_in_cycle,
+    fit_facts,
     in_time,
     peaks,
     rest_on_floor,
@@ -25,7 +29,6 @@ from bodyplan.gaits.following import (
     rule_notes,
     with_kink,
 )
-from bodyplan.gaits.serpentine import CLOSED, FINE
 from bodyplan.gaits.touching import pole_gaps
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
@@ -133,8 +136,7 @@ class Rolling(Gait):
         """The motion at times t (T,) >= 0 s. Raises InputError where the robot can follow no curve or has no round
         contacts, and where the floor under the path is not level; samples beyond a joint limit have the status
         "limit"."""
-        if t[0] < 0.0:
-            raise InputError(f"t: the gait starts at t = 0, got {t[0]}.")
+        from_zero(t)
         body = _rolled(self, robot)
         following = body.following
         joints = body.joints(t)
@@ -145,12 +147,6 @@ class Rolling(Gait):
         path[:, 2] += rise
         up = np.array([0.0, 0.0, rise])
         step = twists.exp(self.period(robot) * body.motion)
-        data = {
-            "period": self.period(robot),
-            "advance": apply(step, -up) + up,
-            "turn": self.period(robot) * body.motion[3:],
-            "tolerance": CLOSED,
-        }
         places = np.broadcast_to(following.stations, (len(t), len(following.stations)))
         grip: dict[str, Any] = {"speed": abs(self.rate) * body.radius, "tolerance": CREEP}
         contacts = None
@@ -165,37 +161,32 @@ class Rolling(Gait):
             grip["height"] = TOUCH * float(heights.max()) if self.touch is None else self.touch
             contacts = heights <= grip["height"]
         claims = (
-            following.follows(path, places, self._farthest(robot), "frames on the curve that stays in space"),
-            Claim("periodic", "the cycle closes", data),
+            following.follows(
+                path,
+                places,
+                farthest_in_cycle(partial(self.fit_at, robot), self.period(robot)),
+                "frames on the curve that stays in space",
+            ),
+            closes(self.period(robot), apply(step, -up) + up, self.period(robot) * body.motion[3:]),
             Claim("grips", "what touches is at rest", grip),
         )
-        return Motion(
-            robot=robot,
-            ground=ground,
-            gait=self.to_dict(),
-            t=t,
-            base=base,
-            q=joints.q,
-            qd=joints.qd,
-            qdd=joints.qdd,
+        return following.motion(
+            self,
+            ground,
+            t,
+            base,
+            joints,
+            contacts=contacts,
             residual=np.full(len(t), body.residual),
-            status=following.within_limits(joints.q),
             claims=claims,
-            contacts=None if contacts is None else contacts.astype(np.float64),
             facts=self._facts(body, contacts is not None, float(heights.max()), grip["height"]),
             notes=tuple(self._notes(body)),
         )
-
-    def _farthest(self, robot: Robot) -> float:
-        """m: largest distance that fits over a cycle leave to the body curve."""
-        times = np.linspace(0.0, self.period(robot), FITS)
-        return max(float(self.fit_at(robot, float(t)).max_distance) for t in times)
 
     def _facts(self, body: _Roll, lifts: bool, lift: float, within: float) -> dict[str, float]:
         period = self.period(body.following.robot)
         bend = self.curvature**2 + self.twist**2
         moved = float(np.linalg.norm(body.motion[:3])) if self.around == "floor" else abs(body.climb)
-        fit = self.fit_at(body.following.robot, 0.0)
         out = {
             "period": period,
             "advance_per_cycle": moved * period,
@@ -208,8 +199,7 @@ class Rolling(Gait):
             "turns_of_helix": np.sqrt(bend) * body.following.length / (2.0 * np.pi),
             "body_length": body.following.length,
             **peaks(body.joints(np.linspace(0.0, period, FINE, endpoint=False))),
-            "fit_error": float(fit.error),
-            "fit_distance": float(fit.max_distance),
+            **fit_facts(self.fit_at(body.following.robot, 0.0)),
             "lift": lift,
         }
         if lifts:

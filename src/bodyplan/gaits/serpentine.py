@@ -15,14 +15,18 @@ from bodyplan.curves.base import BodyCurve
 from bodyplan.curves.constant import Constant
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits import chassis
-from bodyplan.gaits.base import Gait
+from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.course import course_of
 from bodyplan.gaits.following import (
+    CLOSED,
+    FINE,
     FITS,
     SLIP,
     Following,
     Joints,
     body_curve,
+    closes,
+    fit_facts,
     frames_of,
     peaks,
     rest_on_floor,
@@ -39,12 +43,10 @@ from bodyplan.spatial import compose, inverse, quaternion_exp, rotate
 from bodyplan.units import to_si
 
 BASES = ("follow", "chassis")
-#: samples of a cycle for peaks of rates, and for the mean frame of the virtual chassis
-FINE, EVEN = 2000, 256
+#: samples of a cycle for the mean frame of the virtual chassis
+EVEN = 256
 #: each is a curve inside a curve
 MOST_CHANGES = 10
-#: m and rad: how well a cycle closes
-CLOSED = 1e-9
 
 
 class Serpentine(Gait):
@@ -194,8 +196,7 @@ class Serpentine(Gait):
         """The motion at times t (T,) >= 0 s. Raises InputError where the robot can follow no curve (see
         :func:`bodyplan.fitting.mechanism`) or the floor under the path is not level; samples beyond a joint limit have
         the status "limit"."""
-        if t[0] < 0.0:
-            raise InputError(f"t: the gait starts at t = 0, got {t[0]}.")
+        from_zero(t)
         body = self._body(robot)
         following = body.following
         sigma, speed, acceleration = self.pace.at(t)
@@ -211,21 +212,17 @@ class Serpentine(Gait):
         facts["lift"] = lift
         if contacts is not None:
             facts["contact_height"] = within
-        return Motion(
-            robot=robot,
-            ground=ground,
-            gait=self.to_dict(),
-            t=t,
-            base=base,
-            q=joints.q,
-            qd=joints.qd,
-            qdd=joints.qdd,
+        return following.motion(
+            self,
+            ground,
+            t,
+            base,
+            joints,
+            contacts=contacts,
             residual=following.residual(sigma, on_curve),
-            status=following.within_limits(joints.q),
             claims=tuple(
                 self._claims(body, placing, pose, sigma, speed, base, on_curve, joints.kink, contacts is None)
             ),
-            contacts=None if contacts is None else contacts.astype(np.float64),
             facts=facts,
             notes=tuple(self._notes(body, placing, within if contacts is not None else None)),
         )
@@ -260,9 +257,7 @@ class Serpentine(Gait):
             claims.append(following.follows(path, places, body.farthest(sigma)))
         period = self.period(body.following.robot)
         if period is not None:
-            advance, turn = _cycle(placing, self.pace.direction)
-            data = {"period": period, "advance": advance, "turn": turn, "tolerance": CLOSED}
-            claims.append(Claim("periodic", "the cycle closes", data))
+            claims.append(closes(period, *_cycle(placing, self.pace.direction)))
         if flat and following.robot.contacts:
             claims.append(Claim("on_floor", "the body lies on the floor", {"tolerance": CLOSED}))
         return claims
@@ -352,9 +347,7 @@ class SerpentineBody:
                 out["period"] = period
         fine = np.linspace(0.0, period, FINE, endpoint=False) if period else np.linspace(t[0], t[-1], FINE)
         out |= peaks(following.joints(*gait.pace.at(fine)))
-        fit = gait.fit_at(following.robot, float(t[0]))
-        out |= {"fit_error": float(fit.error), "fit_distance": float(fit.max_distance)}
-        return out
+        return out | fit_facts(gait.fit_at(following.robot, float(t[0])))
 
     def farthest(self, sigma: Array) -> float:
         """m: largest distance that fits leave to the curve where the tail comes to, ``sigma`` (T,) m, or over a period

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,11 +14,14 @@ from bodyplan.curves.base import BodyCurve
 from bodyplan.curves.constant import Constant
 from bodyplan.curves.serpenoid import Serpenoid
 from bodyplan.errors import InputError
-from bodyplan.gaits.base import Gait
+from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.following import (
-    FITS,
+    FINE,
     Following,
     Joints,
+    closes,
+    farthest_in_cycle,
+    fit_facts,
     in_time,
     peaks,
     rest_on_floor,
@@ -28,7 +31,6 @@ from bodyplan.gaits.following import (
 )
 from bodyplan.gaits.pace import Pace
 from bodyplan.gaits.placing import SAMPLES, TOLERANCE, across
-from bodyplan.gaits.serpentine import CLOSED, FINE
 from bodyplan.gaits.touching import touching
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
@@ -138,8 +140,7 @@ class Sidewinding(Gait):
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
         """The motion at times t (T,) >= 0 s. Raises InputError where the robot can follow no curve or the floor under
         the path is not level; samples beyond a joint limit have the status "limit"."""
-        if t[0] < 0.0:
-            raise InputError(f"t: the gait starts at t = 0, got {t[0]}.")
+        from_zero(t)
         body, level = _sidewinder(self, robot), _levelled(self)
         following = body.following
         sigma, speed, acceleration = self.pace.at(t)
@@ -157,9 +158,9 @@ class Sidewinding(Gait):
         covers = float(t[-1] - t[0]) >= 0.95 * self.period(robot)
         contacts, _, within = touching(heights, TOUCH * lift if self.touch is None else self.touch, covers)
         # the torsion does not move the points of the curve
-        claims = [following.follows(path, sigma[:, None] + following.stations, self._farthest(robot))]
-        data = {"period": self.period(robot), "advance": level.advance, "turn": 0.0, "tolerance": CLOSED}
-        claims.append(Claim("periodic", "the cycle closes", data))
+        farthest = farthest_in_cycle(partial(self.fit_at, robot), self.period(robot))
+        claims = [following.follows(path, sigma[:, None] + following.stations, farthest)]
+        claims.append(closes(self.period(robot), level.advance, 0.0))
         if robot.contacts:
             data = {"height": within, "speed": self.pace.speed, "tolerance": CREEP}
             claims.append(Claim("grips", "what touches the floor is at rest", data))
@@ -167,34 +168,24 @@ class Sidewinding(Gait):
         notes.append("The world's x axis is the direction of travel; the body lies at direction_angle to it.")
         notes.append(f"A torsion of {level.torsion:.4g} rad/m keeps the wave level and turns the planes of bending.")
         notes.append(f"Contacts up to {within * 1e3:.3g} mm above the floor count as touching.")
-        return Motion(
-            robot=robot,
-            ground=ground,
-            gait=self.to_dict(),
-            t=t,
-            base=base,
-            q=joints.q,
-            qd=joints.qd,
-            qdd=joints.qdd,
+        return following.motion(
+            self,
+            ground,
+            t,
+            base,
+            joints,
+            contacts=contacts,
             residual=following.residual(sigma, on_curve),
-            status=following.within_limits(joints.q),
             claims=tuple(claims),
-            contacts=None if contacts is None else contacts.astype(np.float64),
             facts=self._facts(body, level) | {"lift": lift, "contact_height": within},
             notes=tuple(notes),
         )
-
-    def _farthest(self, robot: Robot) -> float:
-        """m: largest distance that fits over a cycle leave to the wave."""
-        times = np.linspace(0.0, self.period(robot), FITS)
-        return max(float(self.fit_at(robot, float(t)).max_distance) for t in times)
 
     def _facts(self, body: _Sidewinder, level: _Level) -> dict[str, float]:
         following = body.following
         period = self.period(following.robot)
         advance = float(level.advance[0])
         fine = np.linspace(0.0, period, FINE, endpoint=False)
-        fit = self.fit_at(following.robot, 0.0)
         return {
             "period": period,
             "advance_per_cycle": advance,
@@ -208,8 +199,7 @@ class Sidewinding(Gait):
             "torsion": level.torsion,
             "body_length": following.length,
             **peaks(body.joints(*self.pace.at(fine))),
-            "fit_error": float(fit.error),
-            "fit_distance": float(fit.max_distance),
+            **fit_facts(self.fit_at(following.robot, 0.0)),
         }
 
 
