@@ -101,6 +101,7 @@ def export(
     with _bad_input():
         from bodyplan.errors import InputError, UnknownNameError
         from bodyplan.export import FORMATS, save
+        from bodyplan.files import refuse_existing
 
         suffix = "." + to.lower().lstrip(".")
         if suffix not in FORMATS:
@@ -108,8 +109,7 @@ def export(
         target = out if out is not None else Path(Path(mission).stem + suffix)
         if target.suffix.lower() != suffix:
             raise InputError(f"--out {target}: does not end in {suffix}.")
-        if target.exists() and not force:
-            raise InputError(f"{target}: exists already; choose another place with --out, or --force to replace it.")
+        refuse_existing(target, force)
         typer.echo(save(_motion(mission, set_), target))
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -22,6 +20,7 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.check import check
 from bodyplan.errors import BodyplanError, InputError, MissingExtraError
+from bodyplan.files import refuse_existing, refuse_folder, replacing_folder
 from bodyplan.metrics import Metrics, metrics_of
 from bodyplan.missions import Mission, load_mission
 from bodyplan.missions.files import alone, model_section, ready_missions
@@ -276,7 +275,7 @@ def run(
     if not isinstance(mission, Mission):
         mission = load_mission(mission, tuple(overrides))
     folder = Path(out) if out is not None else Path("runs") / mission.name
-    refuse_existing(folder, force)
+    refuse_folder(folder, force, WRITTEN)
     _needs(simulate and mission.simulate is not None)
     outcome = work(mission, simulate=simulate, compare=compare, progress=progress)
     metrics = metrics_of(outcome)
@@ -310,25 +309,6 @@ WRITTEN = ("report.html", "figures", "motion.csv", "motion.npz", "robot.xml", "m
            "mission.toml")  # fmt: skip
 
 
-def refuse_existing(path: Path, force: bool, written: Sequence[str] = WRITTEN) -> None:
-    """InputError where ``path`` is no place for a folder of the files ``written``: it exists and may not be replaced,
-    or cannot be written."""
-    if path.is_symlink() or (path.exists() and not path.is_dir()):
-        raise InputError(f"{path}: is a file; --out must name a folder.")
-    if path.exists():
-        foreign = sorted(p.name for p in path.iterdir() if p.name not in written)
-        if foreign:
-            names = ", ".join(foreign[:5])
-            raise InputError(f"{path}: holds files that bodyplan did not write ({names}); choose another with --out.")
-        if not force:
-            raise InputError(f"{path}: exists already; choose another place with --out, or --force to replace it.")
-    parent = path.absolute().parent
-    while not parent.exists():
-        parent = parent.parent
-    if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise InputError(f"{path}: cannot be written, {parent} is not a folder that may be written to.")
-
-
 def _needs(simulate: bool) -> None:
     """MissingExtraError for what a run would miss at its end."""
     if simulate and find_spec("mujoco") is None:
@@ -342,7 +322,7 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
     """Write every file of a run to a temporary folder beside ``folder``, then move it into place."""
     from bodyplan.show.report import write_report
 
-    with _whole(folder, force, WRITTEN) as scratch:
+    with replacing_folder(folder, force, WRITTEN) as scratch:
         motion = outcome.motion
         names = ("motion.csv", "motion.npz", "robot.xml")
         for name in names if find_spec("mujoco") is not None else names[:2]:
@@ -357,26 +337,6 @@ def write_folder(outcome: Outcome, metrics: Metrics, folder: Path, force: bool) 
         write_report(outcome, scratch)
 
 
-@contextmanager
-def _whole(folder: Path, force: bool, written: Sequence[str]) -> Iterator[Path]:
-    """A temporary folder beside ``folder``, moved into its place when all is written."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-    try:
-        yield scratch
-        scratch.chmod(0o755)
-        if folder.exists():
-            refuse_existing(folder, force, written)
-            old = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
-            folder.replace(old / folder.name)
-            scratch.replace(folder)
-            shutil.rmtree(old)
-        else:
-            scratch.replace(folder)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-
-
 #: suffixes of a fit that is one file
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -389,11 +349,11 @@ def fit_target(name: str, out: Path | None, force: bool) -> Path:
     if suffix not in (".html", *PICTURES):
         if suffix and not target.is_dir():
             raise InputError(f"--out {target}: name a folder, or a file ending in .html, .png, .svg or .pdf.")
-        refuse_existing(target, force, FIT_FILES)
+        refuse_folder(target, force, FIT_FILES)
     elif target.is_dir():
         raise InputError(f"{target}: is a folder; --out names a file here.")
-    elif target.exists() and not force:
-        raise InputError(f"{target}: exists already; choose another place with --out, or --force to replace it.")
+    else:
+        refuse_existing(target, force)
     for library, needed in (("plotly", suffix not in PICTURES), ("matplotlib", suffix != ".html")):
         if needed and find_spec(library) is None:
             raise MissingExtraError(library, "report", "drawing a fit")
@@ -408,6 +368,6 @@ def write_fit(outcome: FitOutcome, target: Path, force: bool) -> Path:
         return write_fit_page(outcome, target)
     if target.suffix.lower() in PICTURES:
         return write_fit_figure(outcome, target)
-    with _whole(target, force, FIT_FILES) as scratch:
+    with replacing_folder(target, force, FIT_FILES) as scratch:
         page = write_fit_folder(outcome, scratch).name
     return target / page
