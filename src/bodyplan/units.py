@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -27,8 +28,7 @@ SI_UNITS = {
 
 
 @cache
-def registry() -> Any:
-    """The pint registry that all quantities are read with; made when first needed."""
+def _registry() -> Any:
     import pint
 
     return pint.UnitRegistry(cache_folder=None)
@@ -48,14 +48,9 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
     elif isinstance(value, str):
         if not _QUANTITY.fullmatch(value):
             raise InputError(_wrong(value, dimension, field))
-        import pint
-
-        try:
-            quantity = registry().Quantity(value)
-            # frequency: pint reads Hz as 1/s, and keeps "rad" dimensionless
-            out = float(quantity.to(unit or "dimensionless").magnitude)
-        except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:
-            raise InputError(_wrong(value, dimension, field)) from error
+        # frequency: pint reads Hz as 1/s, and keeps "rad" dimensionless
+        wrong = _wrong(value, dimension, field)
+        out = _read(lambda made: float(made(value).to(unit or "dimensionless").magnitude), wrong)
     else:
         raise InputError(f"{field}: expected {_named(dimension)} such as {_example(dimension)}, got {value!r}.")
     if not np.isfinite(out):
@@ -63,11 +58,35 @@ def to_si(value: Any, dimension: str, field: str = "value") -> float:
     return out
 
 
+@cache
+def unit_in_base(unit: str) -> tuple[float, Mapping[str, float]]:
+    """What one ``unit`` ("mm/s") is in pint's base units, and their powers: {"meter": 1, "second": -1}; (1, {}) where
+    it is empty. InputError for a text that is no unit."""
+    if not unit.strip():
+        return 1.0, {}
+    wrong = f"unit = {unit!r}: not a unit; write for example mm/s, deg, N*m, or % for a share."
+    if not _UNIT.fullmatch(unit):
+        raise InputError(wrong)
+    quantity = _read(lambda made: made(1.0, unit.replace("\u00b7", "*")).to_base_units(), wrong)
+    return float(quantity.magnitude), {str(name): float(power) for name, power in quantity.unit_items()}
+
+
+def _read(work: Callable[[Any], Any], wrong: str) -> Any:
+    """What ``work`` makes of pint's maker of quantities; InputError saying ``wrong`` where pint cannot."""
+    import pint
+
+    try:
+        return work(_registry().Quantity)
+    except (pint.errors.PintError, ValueError, TypeError, AssertionError, AttributeError, SyntaxError) as error:
+        raise InputError(wrong) from error
+
+
 #: a number and a unit: nothing that pint would have to compute
 _WORD = r"[A-Za-z\u00b5\u03bc\u00b0%]{1,20}((\*\*|\^)-?\d)?"
+_WORDS = rf"{_WORD}(\s*[*/ \u00b7]\s*{_WORD}){{0,5}}"
+_UNIT = re.compile(rf"\s*(1\s*/\s*)?{_WORDS}\s*")
 _QUANTITY = re.compile(
-    r"\s*[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,3})?\s*"
-    rf"((1?\s*/\s*)?{_WORD}(\s*[*/ \u00b7]\s*{_WORD}){{0,5}})?\s*"
+    r"\s*[+-]?(\d{1,30}(\.\d{0,30})?|\.\d{1,30})([eE][+-]?\d{1,3})?\s*" + rf"((1?\s*/\s*)?{_WORDS})?\s*"
 )
 
 

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from bodyplan.errors import InputError, UnknownNameError
-from bodyplan.show.dimensions import over, read_unit, si_unit
+from bodyplan.show.dimensions import over, si_unit
 from bodyplan.simulate.trial import Trial
+from bodyplan.units import unit_in_base
 
 GROUPS = ("plan", "trial")
 _METRIC = re.compile(r"(?:(?P<mission>[^\s:/]+):)?(?P<group>\w+)\.(?P<name>\w+)")
@@ -66,7 +67,7 @@ def metrics_in(ours: str) -> tuple[Metric, ...]:
 def check_row(ours: str, unit: str, mission: str, compared: Collection[str], cycles: int) -> None:
     """InputError or UnknownNameError for a row whose unit or metrics cannot exist in a run of ``mission`` beside
     ``compared`` ones. Facts of the plan are known after planning only: :func:`check_facts`."""
-    read_unit(unit)
+    unit_in_base(unit)
     for metric in metrics_in(ours):
         if metric.mission not in (None, mission, *compared):
             raise UnknownNameError("mission", metric.mission, compared, where=f"ours = {ours!r}: not in compare")
@@ -124,19 +125,19 @@ def beside(rows: Sequence[Any], figures: Mapping[str | None, Mapping[str, float 
 
 def scale_of(unit: str) -> float:
     """What one ``unit`` is in SI (1 where it is empty). InputError for a text that is no unit."""
-    return read_unit(unit)[0]
+    return unit_in_base(unit)[0]
 
 
 def check_unit(ours: str, unit: str) -> None:
     """InputError for a ``unit`` of another dimension than ``ours``: a ratio has that of the quotient. Without a unit
     the value stands in SI."""
-    _, given = read_unit(unit)
+    _, given = unit_in_base(unit)
     if not unit.strip():
         return
     units = [si_unit(metric.group, metric.name) for metric in metrics_in(ours)]
-    mine = read_unit(units[0])[1]
+    mine = unit_in_base(units[0])[1]
     for below in units[1:]:
-        mine = over(mine, read_unit(below)[1])
+        mine = over(mine, unit_in_base(below)[1])
     if given != mine:
         named = " over ".join(text or "no unit" for text in units)
         wanted = f"a unit of {named}" if mine else "no unit, or % for a share"
