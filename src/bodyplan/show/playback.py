@@ -9,14 +9,13 @@ import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.motion import Motion
+from bodyplan.robot.masses import center_from_poses
 from bodyplan.robot.model import Robot
 from bodyplan.show.following import Following
-from bodyplan.simulate.inertia import inertial
 from bodyplan.simulate.loop import Timing
 from bodyplan.simulate.measure import at, directions
 from bodyplan.simulate.reference import Reference
 from bodyplan.simulate.trial import Trial
-from bodyplan.spatial.rotations import conjugate, rotate
 
 #: pictures a second, most pictures, and most numbers a replay may hold
 RATE, MOST_FRAMES, MOST_NUMBERS = 25.0, 1500, 1_200_000
@@ -120,30 +119,7 @@ class Playback:
 def centre_of_mass(robot: Robot, poses: Array) -> Array:
     """Centre of mass (..., 3) m of a robot whose frames have poses (..., f, 7); the mean of the frames'
     origins where nothing has mass."""
-    bodies = [robot.base_body, *(element.body for element in robot.elements)]
-    total, weighted = 0.0, np.zeros((*poses.shape[:-2], 3))
-    rest = poses.reshape(-1, *poses.shape[-2:])[0]
-    parents = _parents(robot)
-    for frame, body in enumerate(bodies):
-        if body is None:
-            continue
-        previous = rest[parents[frame], :3] - rest[frame, :3]
-        shapes = [contact for contact in robot.contacts if contact.frame == robot.frames[frame]]
-        centre = inertial(body, shapes, rotate(conjugate(rest[frame, 3:]), previous)).com
-        weighted += body.mass * (poses[..., frame, :3] + rotate(poses[..., frame, 3:], centre))
-        total += body.mass
-    return weighted / total if total > 0.0 else np.asarray(poses[..., :3].mean(axis=-2))
-
-
-def _parents(robot: Robot) -> list[int]:
-    """For each frame the index of the frame before it (the base is its own)."""
-    parents = [0]
-    for chain in robot.chains:
-        before = robot.frame_index(chain.parent)
-        for i in range(len(chain.elements)):
-            parents.append(before)
-            before = robot.frame_index(chain.frame_name(i))
-    return parents
+    return center_from_poses(robot, poses) if robot.mass > 0.0 else np.asarray(poses[..., :3].mean(axis=-2))
 
 
 def _centres(reference: Reference, phase: Array) -> Array:

@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array
 from bodyplan.robot.elements import Body, Contact
+from bodyplan.robot.masses import RIM_HALF_WIDTH, centre_of, centroid, middle, volume
 
 #: density of water, kg/m^3: gives a rod or a bare motor a thickness where nothing else says
 WATER = 1000.0
-#: half width of a rim's cylinder over its radius (a contact names the circle only)
-RIM_HALF_WIDTH = 0.1
 
 
 class Inertial(NamedTuple):
@@ -28,20 +27,18 @@ class Inertial(NamedTuple):
 def inertial(body: Body, contacts: Sequence[Contact], previous: ArrayLike) -> Inertial:
     """Inertial properties of a frame that carries ``body`` and ``contacts``.
 
-    Where ``body`` names no centre of mass it is the centroid of the contact shapes, and without any the
-    middle of a rod from ``previous`` (3,), the origin of the previous frame in this one, to the origin.
-    Where it names no inertia it is that of the shapes as homogeneous solids, or of the rod, with the
-    thickness that gives it the density of water (a sphere where the rod has no length).
+    The centre of mass is that of :func:`bodyplan.robot.masses.centre_of`; ``previous`` (3,) m is the origin of the
+    previous frame in this one. Where ``body`` names no inertia it is that of the shapes as homogeneous solids about
+    their centroid, or of a rod from ``previous`` to the origin, with the thickness that gives it the density of water
+    (a sphere where the rod has no length).
     """
     if contacts:
         solids = [_solid(contact) for contact in contacts]
-        volumes = np.array([s.mass for s in solids])
-        centre = volumes @ np.array([s.com for s in solids]) / volumes.sum()
-        unit = sum((s.inertia + s.mass * _offset(s.com - centre) for s in solids), np.zeros((3, 3))) / volumes.sum()
+        centre, total = centroid(contacts), sum(s.mass for s in solids)
+        unit = sum((s.inertia + s.mass * _offset(s.com - centre) for s in solids), np.zeros((3, 3))) / total
     else:
-        rod = -np.asarray(previous, dtype=np.float64)
-        centre, unit = -0.5 * rod, _rod(rod, body.mass)
-    com = centre if body.com is None else np.array(body.com)
+        unit = _rod(-np.asarray(previous, dtype=np.float64), body.mass)
+    com = centre_of(body, contacts, previous)
     inertia = body.mass * unit
     if body.inertia is not None:
         xx, yy, zz, xy, xz, yz = body.inertia
@@ -58,25 +55,21 @@ def axis_of(contact: Contact) -> tuple[Array, float]:
 
 def _solid(contact: Contact) -> Inertial:
     """Volume (as mass at density 1), centroid and inertia of a contact shape."""
-    r, centre = contact.radius, np.array(contact.start)
+    r, size, centre = contact.radius, volume(contact), middle(contact)
     if contact.shape == "sphere":
-        volume = 4.0 / 3.0 * np.pi * r**3
-        return Inertial(volume, centre, 0.4 * volume * r**2 * np.eye(3))
+        return Inertial(size, centre, 0.4 * size * r**2 * np.eye(3))
     if contact.shape == "box":
         half = np.array(contact.half)
-        volume = 8.0 * float(np.prod(half))
-        return Inertial(volume, centre, volume / 3.0 * np.diag(half @ half - half**2))
+        return Inertial(size, centre, size / 3.0 * np.diag(half @ half - half**2))
     if contact.shape == "rim":
-        volume = np.pi * r**2 * 2.0 * RIM_HALF_WIDTH * r
-        return Inertial(volume, centre, volume * _cylinder(np.array([0.0, 0.0, 1.0]), r, 2.0 * RIM_HALF_WIDTH * r))
+        return Inertial(size, centre, size * _cylinder(np.array([0.0, 0.0, 1.0]), r, 2.0 * RIM_HALF_WIDTH * r))
     axis, length = axis_of(contact)
     tube, caps = np.pi * r**2 * length, 4.0 / 3.0 * np.pi * r**3
     # two half balls: 2/5 m r^2 about the axis; across it, their centroids lie 3r/8 outside the tube's ends
     across = caps * (0.4 * r**2 + 0.25 * length**2 + 0.375 * r * length)
     line = np.outer(axis, axis)
     ends = across * (np.eye(3) - line) + 0.4 * caps * r**2 * line
-    middle = 0.5 * np.add(contact.start, contact.end)
-    return Inertial(tube + caps, middle, tube * _cylinder(axis, r, length) + ends)
+    return Inertial(size, centre, tube * _cylinder(axis, r, length) + ends)
 
 
 def _cylinder(axis: Array, radius: float, length: float) -> Array:

@@ -16,8 +16,9 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError
 from bodyplan.robot.elements import Arc, Body, Contact, Joint, Row, WheelRadius
+from bodyplan.robot.masses import RIM_HALF_WIDTH, previous_origins
 from bodyplan.robot.model import Robot
-from bodyplan.simulate.inertia import RIM_HALF_WIDTH, Inertial, axis_of, inertial
+from bodyplan.simulate.inertia import Inertial, axis_of, inertial
 from bodyplan.simulate.library import mujoco
 from bodyplan.spatial.rotations import conjugate, multiply, quaternion_exp, rotate
 
@@ -59,6 +60,7 @@ class _Builder:
             self.contacts.setdefault(contact.frame, []).append(contact)
         rest = robot.forward(np.zeros(robot.n))
         self.rest = {name: rest[name] for name in robot.frames}
+        self.previous = dict(zip(robot.frames, previous_origins(robot), strict=True))
         size = float(np.max(np.linalg.norm(rest.positions, axis=-1), initial=0.0))
         speck = max(SPECK * robot.mass, 1e-14)
         self.speck = Inertial(speck, np.zeros(3), max(speck * size**2, 1e-14) * np.eye(3))
@@ -83,7 +85,7 @@ class _Builder:
 
     def build(self) -> Drives:
         base = self._body(self.spec.worldbody, "base", np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), [], free=True)
-        self._furnish(base, "base", self.robot.base_body, np.zeros(3), moves=True)
+        self._furnish(base, "base", self.robot.base_body, moves=True)
         for chain in self.robot.chains:
             parent = chain.parent
             for i, element in enumerate(chain.elements):
@@ -116,7 +118,7 @@ class _Builder:
             if isinstance(value := getattr(row, field), Joint)
         ]
         body = self._body(self.bodies[parent], frame, place, turn, hinges)
-        self._furnish(body, frame, row.body, previous, moves=bool(hinges))
+        self._furnish(body, frame, row.body, moves=bool(hinges))
 
     def _add_arc(self, arc: Arc, frame: str, parent: str) -> None:
         """An arc as k equal pieces that bend at their middles: the chord of a piece of angle 2y is too long
@@ -129,7 +131,7 @@ class _Builder:
             body = self._body(
                 self.bodies[parent], frame, rotate(back, there[:3] - here[:3]), multiply(back, there[3:]), []
             )
-            self._furnish(body, frame, arc.body, -rotate(conjugate(there[3:]), there[:3] - here[:3]), moves=False)
+            self._furnish(body, frame, arc.body, moves=False)
             return
         body = self.bodies[parent]
         k, piece = self.arc_joints, arc.length / self.arc_joints
@@ -152,7 +154,7 @@ class _Builder:
             body = self._body(body, name, start + rotate(turn, out), turn, hinges)
             if not last:
                 self._mass(body, self.speck)
-        self._furnish(body, frame, arc.body, -arc.length * X, moves=True)
+        self._furnish(body, frame, arc.body, moves=True)
 
     # --- pieces ---------------------------------------------------------------------------------------------
 
@@ -180,13 +182,13 @@ class _Builder:
             self.made.append((name, self.robot.joints.index(joint.name), joint.scale))
         return body
 
-    def _furnish(self, body: Any, frame: str, carried: Body | None, previous: Array, *, moves: bool) -> None:
+    def _furnish(self, body: Any, frame: str, carried: Body | None, *, moves: bool) -> None:
         body.add_site(name=frame, size=[0.002] * 3, group=4)
         shapes = self.contacts.get(frame, [])
         for contact in shapes:
             self._shape(body, contact)
         if carried is not None:
-            self._mass(body, inertial(carried, shapes, previous))
+            self._mass(body, inertial(carried, shapes, self.previous[frame]))
         elif moves:
             self._mass(body, self.speck)
 
