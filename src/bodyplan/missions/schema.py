@@ -27,6 +27,8 @@ Builder = Callable[..., Any]
 _SNAKE_UNITS = {
     "link_length": "length",
     "radius": "length",
+    "foot_radius": "length",
+    "foot_spread": "length",
     "mass": "mass",
     "limits": "angle",
     "rate": "angular_rate",

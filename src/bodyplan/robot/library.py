@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import finite, number, whole
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.model import Robot
-from bodyplan.robot.snakes import AXES, END_LINK, Parts, Units, arcs, doubles, straight
+from bodyplan.robot.snakes import AXES, END_LINK, FIRST, Feet, Parts, Units, arcs, doubles, straight
 
 DENSITY = 1000.0  # kg/m^3, water: what a link weighs when nobody says
 DEGREE = np.pi / 180.0
@@ -25,8 +25,11 @@ def snake(
     joint: str = "straight",
     *,
     axes: str = "yaw",
+    first: str = "yaw",
     end_link: float | None = None,
     radius: float | None = None,
+    foot_radius: float | None = None,
+    foot_spread: float = 0.0,
     mass: float | None = None,
     limits: Any = None,
     rate: float | None = None,
@@ -50,8 +53,9 @@ def snake(
       Ry(pitch) and Rz(yaw) half way again; the joint coordinate is the whole angle.
 
     ``axes``: "yaw" (about z; joints "yaw1", ...), "pitch" (right-handed about y, nose down; "pitch1", ...),
-    "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...), "universal" (at every joint both:
-    "yaw1", "pitch1", ...; a straight joint turns by yaw, then by pitch).
+    "alternating" (odd joints yaw, even ones pitch: "yaw1", "pitch2", ...; with ``first`` "pitch" the other way round:
+    "pitch1", "yaw2", ...), "universal" (at every joint both: "yaw1", "pitch1", ...; a straight joint turns by yaw,
+    then by pitch).
 
     ``radius`` m of the round body (default 0.3 of the mean unit length). ``mass`` kg of one unit (default: the
     volume of its capsule at 1000 kg/m^3), spread evenly along it. ``limits`` (low, high) rad, ``rate`` rad/s and
@@ -65,7 +69,13 @@ def snake(
     frame is at its front end and may lie on its side), "link1" (the front end link of unit 1 and the rear one of
     unit 2, one part), ..., "linkN" (the last end link).
 
-    Raises InputError for a value out of range and for ``end_link`` with another joint, UnknownNameError for an
+    ``foot_radius`` m gives a snake of straight joints feet: balls on the axis of every joint that pitches, "foot2" for
+    joint 2, or "foot2.left" and "foot2.right" at ``foot_spread`` m to either side of it. They belong to the link behind
+    the joint and weigh nothing. The body must then be no thicker than its feet, or the ground would carry it elsewhere:
+    ``radius`` is half of ``foot_radius`` by default.
+
+    Raises InputError for a value out of range and for options that do not go together (``end_link`` without double
+    joints, ``first`` without alternating axes, feet without straight joints that pitch), UnknownNameError for an
     unknown joint or axes.
     """
     count = whole(links, "links", at_least=1, at_most=MAX_LINKS)
@@ -76,14 +86,26 @@ def snake(
     if end_link is not None and joint != "double":
         raise InputError(f'end_link: only joint="double" has end links, joint is {joint!r}; got {end_link!r}.')
     share = number(END_LINK if end_link is None else end_link, "end_link", above=0.0, below=0.5)
+    if first not in FIRST:
+        raise UnknownNameError("first", first, FIRST, where="snake")
+    if first != "yaw" and axes != "alternating":
+        raise InputError(f'first: only axes="alternating" has a first axis, axes is {axes!r}; got {first!r}.')
     lengths = _lengths(link_length, count)
-    thick = number(0.3 * float(lengths.mean()) if radius is None else radius, "radius", above=0.0)
+    feet = _feet(foot_radius, foot_spread, joint)
+    usual = 0.3 * float(lengths.mean()) if feet is None else 0.5 * feet.radius
+    thick = number(usual if radius is None else radius, "radius", above=0.0)
+    if feet is not None and thick > feet.radius:
+        raise InputError(
+            f"radius: must be <= foot_radius = {feet.radius}, or the body would lie on the ground; got {thick}."
+        )
     info = {"limits": limits, "rate": rate, "effort": effort}
 
     weights = DENSITY * np.pi * thick**2 * (lengths + 4.0 / 3.0 * thick)
     if mass is not None:
         weights = np.full(count, number(mass, "mass", above=0.0))
-    units = Units(lengths, weights, thick, axes, info, friction)
+    units = Units(lengths, weights, thick, axes, info, friction, first, feet)
+    if feet is not None and not any("pitch" in units.bends(i) for i in range(1, count)):
+        raise InputError(f"foot_radius: feet are on joints that pitch; {count} links with {axes!r} axes have none.")
     parts = straight(units) if joint == "straight" else arcs(units) if joint == "arc" else doubles(units, share)
     return _robot(parts, "snake" if name is None else name)
 
@@ -123,6 +145,17 @@ def acm_l2(
 
 def _robot(parts: Parts, name: str) -> Robot:
     return Robot.from_rows({"body": parts.elements}, contacts=parts.contacts, base_body=parts.base_body, name=name)
+
+
+def _feet(radius: float | None, spread: float, joint: str) -> Feet | None:
+    wide = number(spread, "foot_spread", at_least=0.0)
+    if radius is None:
+        if wide > 0.0:
+            raise InputError(f"foot_spread: a snake without foot_radius has no feet; got {spread!r}.")
+        return None
+    if joint != "straight":
+        raise InputError(f'foot_radius: only joint="straight" has feet, joint is {joint!r}; got {radius!r}.')
+    return Feet(number(radius, "foot_radius", above=0.0), wide)
 
 
 def _lengths(link_length: ArrayLike, count: int) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -13,8 +13,16 @@ from bodyplan.arrays import Array
 from bodyplan.robot.elements import Arc, Body, Contact, Element, Joint, Row
 
 AXES = ("yaw", "pitch", "alternating", "universal")
+FIRST = ("yaw", "pitch")
 QUARTER = 0.5 * np.pi
 END_LINK = 0.18
+
+
+class Feet(NamedTuple):
+    """Balls of ``radius`` m on the axis of every pitch joint, ``spread`` m to the left and to the right of the body."""
+
+    radius: float
+    spread: float = 0.0
 
 
 class Parts(NamedTuple):
@@ -28,7 +36,7 @@ class Parts(NamedTuple):
 @dataclass(frozen=True)
 class Units:
     """Units of a snake from tail to head: ``lengths`` (N,) m and ``masses`` (N,) kg, ``radius`` m, ``axes``,
-    properties of every joint (``info``), ``friction`` of the belly."""
+    properties of every joint (``info``), ``friction`` of the belly; ``first`` axis of "alternating", ``feet``."""
 
     lengths: Array
     masses: Array
@@ -36,11 +44,14 @@ class Units:
     axes: str
     info: Mapping[str, Any]
     friction: float | None
+    first: str = "yaw"
+    feet: Feet | None = None
 
     def bends(self, i: int) -> dict[str, Joint]:
         """The joints at place ``i`` (from 1) by the axis that they turn about."""
-        yaw = self.axes in ("yaw", "universal") or (self.axes == "alternating" and i % 2 == 1)
-        pitch = self.axes in ("pitch", "universal") or (self.axes == "alternating" and i % 2 == 0)
+        turn = (self.first == "yaw") == (i % 2 == 1)
+        yaw = self.axes in ("yaw", "universal") or (self.axes == "alternating" and turn)
+        pitch = self.axes in ("pitch", "universal") or (self.axes == "alternating" and not turn)
         joints = {"yaw": yaw, "pitch": pitch}
         return {axis: Joint(f"{axis}{i}", **self.info) for axis, there in joints.items() if there}
 
@@ -49,12 +60,28 @@ class Units:
         start, end = (0.0 - behind, 0.0, 0.0), (ahead, 0.0, 0.0)
         return Contact(name, frame, "capsule", self.radius, start=start, end=end, friction=self.friction)
 
+    def soles(self, i: int, frame: str) -> list[Contact]:
+        """The feet of the joint at place ``i``, which is at the origin of ``frame``; none where it does not pitch."""
+        if self.feet is None or "pitch" not in self.bends(i):
+            return []
+        radius, spread = self.feet
+        sides = {f"foot{i}.left": spread, f"foot{i}.right": -spread} if spread > 0.0 else {f"foot{i}": 0.0}
+        return [
+            Contact(name, frame, "sphere", radius, start=(0.0, y, 0.0), friction=self.friction)
+            for name, y in sides.items()
+        ]
+
 
 def straight(units: Units) -> Parts:
-    """Rigid links; joint i turns between links i and i + 1."""
+    """Rigid links; joint i turns between links i and i + 1, and has its feet at the front end of link i."""
     parts = Parts([], [])
-    for i, (length, mass) in enumerate(_sizes(units), start=1):
-        frame, body = f"link{i}", Body(mass=mass, com=(-0.5 * length, 0.0, 0.0))
+    sizes = _sizes(units)
+    for i, (length, mass) in enumerate(sizes, start=1):
+        frame = f"link{i}"
+        soles = units.soles(i, frame) if i < len(sizes) else []
+        body = Body(mass=mass, com=(-0.5 * length, 0.0, 0.0))
+        if soles:  # feet have no mass of their own, and would else count as part of the solid that the link is
+            body = replace(body, inertia=_cylinder(length, mass, units.radius))
         bends = units.bends(i - 1) if i > 1 else {}
         if "pitch" in bends:
             # Rx(-90 deg) lays the turning axis z along +y, Rx(+90 deg) sets the link upright again
@@ -62,7 +89,7 @@ def straight(units: Units) -> Parts:
             parts.elements.append(Row(theta=bends["pitch"], a=length, epsilon=QUARTER, name=frame, body=body))
         else:
             parts.elements.append(Row(theta=bends.get("yaw", 0.0), a=length, name=frame, body=body))
-        parts.contacts.append(units.capsule(frame, frame, length))
+        parts.contacts.extend([units.capsule(frame, frame, length), *soles])
     return parts
 
 
@@ -93,6 +120,12 @@ def _halves(rear: float, rear_mass: float, front: float, front_mass: float, radi
     spread = masses @ (sizes**2 / 12.0 + (middles - com) ** 2)
     across = float(0.25 * total * radius**2 + spread)
     return Body(mass=total, com=(com, 0.0, 0.0), inertia=(0.5 * total * radius**2, across, across, 0.0, 0.0, 0.0))
+
+
+def _cylinder(length: float, mass: float, radius: float) -> tuple[float, float, float, float, float, float]:
+    """Inertia of a cylinder along x about its centre."""
+    across = mass * (3.0 * radius**2 + length**2) / 12.0
+    return 0.5 * mass * radius**2, across, across, 0.0, 0.0, 0.0
 
 
 def doubles(units: Units, end_link: float, tips: float = 0.0) -> Parts:
