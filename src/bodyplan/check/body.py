@@ -8,6 +8,7 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.check.claims import allowance
 from bodyplan.check.report import Line
 from bodyplan.errors import Status
+from bodyplan.ground import Profile
 from bodyplan.motion import Motion
 from bodyplan.robot.elements import Row
 from bodyplan.robot.neighbours import separate_contacts
@@ -224,7 +225,9 @@ def _separate_pairs(motion: Motion, which: list[int]) -> IntArray:
 
 
 def ground_clearance(motion: Motion) -> list[Line]:
-    """Gap between the capsules and spheres and the floor, and all ground; walls may be pressed as claimed."""
+    """Gap between the capsules and spheres and the floor, and all ground; walls may be pressed as claimed.
+
+    At five points along each capsule, and along the whole of it where the ground is a profile."""
     ends, radii, which = _skeletons(motion)
     if not len(which):
         return []
@@ -233,13 +236,17 @@ def ground_clearance(motion: Motion) -> list[Line]:
     surface = radii[None, :, None]
     normal_z = motion.ground.normal(points[..., 0], points[..., 1])[..., 2]
     above = (points[..., 2] - motion.ground.height(points[..., 0], points[..., 1])) * normal_z - surface
-    lines = [_worst_gap(motion, which, above, "clear of the floor", EXACT)]
+    gap = motion.ground.clearance(points) - surface
+    floor = above
+    if isinstance(motion.ground, Profile):  # a corner of a step may reach through a link between two of the points
+        floor = motion.ground.floor_alone().segment_clearance(ends) - radii
+        gap = motion.ground.segment_clearance(ends) - radii
+    lines = [_worst_gap(motion, which, floor, "clear of the floor", EXACT)]
     lies = allowance(motion, "on_floor")
     if lies is not None:
         lines.append(_lies(motion, which, above, float(lies["tolerance"])))
     presses = allowance(motion, "presses", {})
     depth = float(presses.get("depth", 0.0))
-    gap = motion.ground.clearance(points) - surface
     if depth > 0.0:
         line = _worst_gap(motion, which, gap, f"presses on the {presses['role']} no deeper than planned", depth + EXACT)
         deepest = float(radii.min())
@@ -256,7 +263,7 @@ def ground_clearance(motion: Motion) -> list[Line]:
                 kind="presses",
             )
         )
-    elif np.any(np.abs(gap - above) > EXACT):
+    elif np.any(np.abs(gap - floor) > EXACT):
         lines.append(_worst_gap(motion, which, gap, "clear of walls and ceiling", EXACT))
     return lines
 

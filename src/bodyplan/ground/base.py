@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, finite, number
 from bodyplan.errors import InputError, UnknownNameError
 
+#: points of a segment at which a ground that knows no better looks for its clearance
+SEGMENT_POINTS = 9
+
 
 @dataclass(frozen=True)
 class Solid:
@@ -93,6 +96,17 @@ class Ground(ABC):
         """Signed distance (...,) in m from points (..., 3) to the nearest ground (floor, wall or ceiling):
         positive in free space, negative inside."""
 
+    def segment_clearance(self, ends: ArrayLike) -> Array:
+        """Signed distance (...,) in m to the nearest ground of the nearest, or deepest, point of segments from
+        ``ends[..., 0, :]`` to ``ends[..., 1, :]`` (..., 2, 3): the smallest :meth:`clearance` along each.
+
+        Here it is that of 9 points, evenly spaced with both ends; grounds that can do so give it exactly.
+        """
+        e = segments(ends)
+        s = np.linspace(0.0, 1.0, SEGMENT_POINTS)[:, None]
+        points = e[..., None, 0, :] * (1.0 - s) + e[..., None, 1, :] * s
+        return np.asarray(self.clearance(points).min(axis=-1))
+
     @abstractmethod
     def solids(self, low: ArrayLike, high: ArrayLike) -> list[Solid]:
         """The ground inside the box from ``low`` (3,) to ``high`` (3,) as solids for physics and pictures."""
@@ -158,6 +172,14 @@ def spatial_points(points: ArrayLike) -> Array:
     if p.ndim == 0 or p.shape[-1] != 3:
         raise InputError(f"points: expected shape (..., 3), got {p.shape}.")
     return p
+
+
+def segments(ends: ArrayLike) -> Array:
+    """Ends (..., 2, 3) of segments as finite float64, or InputError."""
+    e = finite(ends, "ends")
+    if e.ndim < 2 or e.shape[-2:] != (2, 3):
+        raise InputError(f"ends: expected shape (..., 2, 3), got {e.shape}.")
+    return e
 
 
 def coulomb(value: Any, field: str) -> float | None:

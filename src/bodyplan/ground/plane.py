@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, number
-from bodyplan.ground.base import Ground, Solid, coulomb, region
+from bodyplan.ground.base import Ground, Solid, coulomb, region, segments
 
 
 class Plane(Ground):
@@ -33,6 +33,10 @@ class Plane(Ground):
     def clearance(self, points: ArrayLike) -> Array:
         """Signed distance (...,) in m from points (..., 3) to the plane: gap / sqrt(1 + |slope|^2)."""
         return np.asarray(self.gap(points) / np.sqrt(1.0 + self.slope[0] ** 2 + self.slope[1] ** 2))
+
+    def segment_clearance(self, ends: ArrayLike) -> Array:
+        """Signed distance (...,) in m of the lower end of segments (..., 2, 3) to the plane, exact."""
+        return np.asarray(self.clearance(segments(ends)).min(axis=-1))
 
     def solids(self, low: ArrayLike, high: ArrayLike) -> list[Solid]:
         """One plane, anchored under the middle of the box."""

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, frozen
 from bodyplan.errors import InputError
-from bodyplan.ground.base import Ground, Solid, coulomb, region, spatial_points
+from bodyplan.ground.base import Ground, Solid, coulomb, region, segments, spatial_points
 from bodyplan.ground.outline import Edge, distance_to_edges
+from bodyplan.ground.steps import steps_clearance
 
 MAX_STEPS = 10_000
 
@@ -67,6 +68,22 @@ class Profile(Ground):
         edges = _edges(self._floor_x, self._floor_z) + _edges(self._ceiling_x, self._ceiling_z)
         inside = (z < self.height(p)) | (z > self.ceiling_height(x))
         return np.asarray(np.where(inside, -1.0, 1.0) * distance_to_edges(x, z, edges))
+
+    def segment_clearance(self, ends: ArrayLike) -> Array:
+        """Smallest :meth:`clearance` (...,) in m along segments from ``ends[..., 0, :]`` to ``ends[..., 1, :]``
+        (..., 2, 3), exact: also where a corner reaches through a segment whose ends are outside."""
+        e = segments(ends)
+        flat = np.ascontiguousarray(e[..., ::2]).reshape(-1, 2, 2)
+        out = np.full(len(flat), np.inf)
+        steps_clearance(flat, self._floor_x, self._floor_z, out)
+        # a ceiling is a floor upside down
+        steps_clearance(flat * (1.0, -1.0), self._ceiling_x, -self._ceiling_z, out)
+        return out.reshape(e.shape[:-2])
+
+    def floor_alone(self) -> Profile:
+        """The same floor under an open sky."""
+        starts = [-np.inf, *map(float, self._floor_x)]
+        return Profile(list(zip(starts, map(float, self._floor_z), strict=True)), friction=self.friction)
 
     def solids(self, low: ArrayLike, high: ArrayLike) -> list[Solid]:
         """A box for each level of floor and ceiling between the x of ``low`` and ``high``."""
