@@ -229,7 +229,8 @@ def test_misuse_names_what_is_wrong() -> None:
     wheel = Robot.from_rows({"w": [Row(d=WheelRadius(Joint("r"), 0.1), body=Body(mass=1.0))]}, contacts=BELLY)
     heavy = Body(mass=1.0, inertia=(1.0, 1.0, 9.0, 0.0, 0.0, 0.0))
     impossible = Robot.from_rows({"a": [Row(theta=Joint("x"), body=heavy)]}, contacts=BELLY)
-    round_robot = Robot.from_rows({"a": [Row(a=0.1)]}, base_body=Body(mass=1.0), contacts=BELLY)
+    square = Contact("square", "base", "box", half=(0.1, 0.1, 0.1))
+    square_robot = Robot.from_rows({"a": [Row(a=0.1)]}, base_body=Body(mass=1.0), contacts=[square])
     with pytest.raises(InputError, match="no mass"):
         build(bare, Plane(), *BOX)
     with pytest.raises(InputError, match=r"wheel-radius.*"):
@@ -238,8 +239,8 @@ def test_misuse_names_what_is_wrong() -> None:
         build(impossible, Plane(), *BOX)
     with pytest.raises(InputError, match="scales need a plane"):
         build(robot, Surface("0.01*sin(x)"), *BOX, friction=scales)
-    with pytest.raises(InputError, match="scales need capsules"):
-        build(round_robot, Plane(), *BOX, friction=scales)
+    with pytest.raises(InputError, match=r"scales need capsules or spheres.*'square'"):
+        build(square_robot, Plane(), *BOX, friction=scales)
     with pytest.raises(UnknownNameError, match="yaw1"):
         build(robot, Plane(), *BOX, servo={"yaw9": (1.0, 0.1)})
     with pytest.raises(InputError, match=r"\(kp, kv\)"):

@@ -8,19 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from bodyplan.arrays import Array, IntArray, number
+from bodyplan.arrays import Array, BoolArray, IntArray, number
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Solid
 from bodyplan.robot.elements import Contact
 
+#: horizontal part of a unit axis below which it is upright
+UPRIGHT = 1e-6
 #: coefficient where neither the ground, nor the contact, nor the caller names one
 DEFAULT = 0.5
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction of a skin with scales: coefficients for sliding ``forward`` and ``backward`` along a capsule
-    (forward is from its ``start`` to its ``end``) and ``sideways`` across it. Raises InputError below 0."""
+    """Friction of a skin with scales: coefficients for sliding ``forward``, ``backward`` and ``sideways``.
+
+    Forward is along a capsule from its ``start`` to its ``end``, and for a sphere the x axis of its frame, seen from
+    above. Raises InputError below 0."""
 
     forward: float
     backward: float
@@ -59,34 +63,86 @@ def pair_friction(solid: Solid, contact: Contact, floor: float | Friction | None
 
 
 class Scales:
-    """Sets the friction along every capsule on the floor from the way that it slides, before each step.
+    """Sets the friction of every contact on the floor from the way that it slides, before each step: MuJoCo has no
+    friction that depends on the direction of sliding."""
 
-    MuJoCo has no friction that depends on the direction of sliding. A capsule on a plane has its contact
-    frame along its axis, so the first coefficient of the pair is that of sliding along; it is set to
-    ``backward`` while the lowest point of the capsule's middle moves against the axis, and to ``forward``
-    while it moves with it. The velocity is that at the beginning of the previous step.
-    """
-
-    def __init__(
-        self,
-        friction: Friction,
-        pairs: IntArray,
-        geoms: IntArray,
-        bodies: IntArray,
-        radii: Array,
-        normals: Array,
-    ) -> None:
-        """``pairs`` (c,) pair index, ``geoms`` (c,) the capsule, with its axis along z, ``bodies`` (c,) its
-        body, ``radii`` (c,) m, ``normals`` (c, 3) of the floor."""
-        self.friction, self.pairs, self.geoms, self.bodies = friction, pairs, geoms, bodies
-        self.down = -radii[:, None] * normals
+    def __init__(self, friction: Friction, parts: Sequence[Runners | Balls]) -> None:
+        self.friction, self.parts = friction, tuple(parts)
 
     def update(self, model: Any, data: Any) -> None:
         """Set ``model.pair_friction`` for the next step."""
+        for part in self.parts:
+            part.update(self.friction, model, data)
+
+
+class Runners:
+    """Capsules on planes.
+
+    A capsule on a plane has its contact frame along its axis, so the first coefficient of the pair is that of
+    sliding along; it is set to ``backward`` while the lowest point of the capsule's middle moves against the axis,
+    and to ``forward`` while it moves with it. The velocity is that at the beginning of the previous step.
+    """
+
+    def __init__(self, pairs: IntArray, geoms: IntArray, bodies: IntArray, radii: Array, normals: Array) -> None:
+        """``pairs`` (c,) pair index, ``geoms`` (c,) the capsule, with its axis along z, ``bodies`` (c,) its
+        body, ``radii`` (c,) m, ``normals`` (c, 3) of the floor."""
+        self.pairs, self.geoms, self.bodies = pairs, geoms, bodies
+        self.down = -radii[:, None] * normals
+
+    def update(self, friction: Friction, model: Any, data: Any) -> None:
+        """Set the first coefficient of every pair."""
         # spatial velocity (omega, v) at the robot's centre of mass, and the way from there to the lowest
         # points
         wx, wy, wz, vx, vy, vz = data.cvel.take(self.bodies, 0).T
         rx, ry, rz = (data.geom_xpos.take(self.geoms, 0) + self.down - data.subtree_com[1]).T
         _, _, ax, _, _, ay, _, _, az = data.geom_xmat.take(self.geoms, 0).T
         along = ax * (vx + wy * rz - wz * ry) + ay * (vy + wz * rx - wx * rz) + az * (vz + wx * ry - wy * rx)
-        model.pair_friction[self.pairs, 0] = np.where(along < 0.0, self.friction.backward, self.friction.forward)
+        model.pair_friction[self.pairs, 0] = np.where(along < 0.0, friction.backward, friction.forward)
+
+
+class Balls:
+    """Spheres on planes and on the level tops of boxes, and capsules on the latter.
+
+    Their contact frames are turned anyhow about the normal, so both coefficients of a pair are set to one value, that
+    of an elliptic law for the direction in which the lowest point of the middle slides: mu = speed /
+    hypot(v_along / mu_along, v_across / mu_across), with mu_along ``forward`` or ``backward``. The velocity is that at
+    the beginning of the previous step. Where nothing moves mu is ``forward``; where a forward axis is upright all
+    sliding is sideways.
+    """
+
+    def __init__(
+        self, pairs: IntArray, geoms: IntArray, bodies: IntArray, radii: Array, normals: Array, capsules: BoolArray
+    ) -> None:
+        """As of :class:`Runners`; ``capsules`` (c,) True where forward is the axis of the shape."""
+        self.pairs, self.geoms, self.bodies, self.normals, self.capsules = pairs, geoms, bodies, normals, capsules
+        self.down = -radii[:, None] * normals
+
+    def update(self, friction: Friction, model: Any, data: Any) -> None:
+        """Set both coefficients of every pair."""
+        moving = data.cvel.take(self.bodies, 0)
+        away = data.geom_xpos.take(self.geoms, 0) + self.down - data.subtree_com[1]
+        velocity = moving[:, 3:] + np.cross(moving[:, :3], away)
+        axes = np.where(
+            self.capsules[:, None],
+            data.geom_xmat.take(self.geoms, 0)[:, 2::3],
+            data.xmat.take(self.bodies, 0)[:, ::3],
+        )
+        mu = directed(friction, velocity, axes, self.normals)
+        model.pair_friction[self.pairs, 0] = model.pair_friction[self.pairs, 1] = mu
+
+
+def directed(friction: Friction, velocity: Array, axes: Array, normals: Array) -> Array:
+    """Coefficients (c,) of the elliptic law of :class:`Balls` for velocities (c, 3) m/s of points on floors with unit
+    ``normals`` (c, 3), forward being ``axes`` (c, 3)."""
+    ahead = axes - (axes * normals).sum(axis=1)[:, None] * normals
+    size = np.linalg.norm(ahead, axis=1)
+    ahead /= np.maximum(size, UPRIGHT)[:, None]
+    along = np.where(size > UPRIGHT, (velocity * ahead).sum(axis=1), 0.0)
+    sliding = velocity - (velocity * normals).sum(axis=1)[:, None] * normals
+    across = np.linalg.norm(sliding - along[:, None] * ahead, axis=1)
+    mu_along = np.where(along < 0.0, friction.backward, friction.forward)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # a part that does not move asks for nothing, also where its coefficient is 0
+        parts = [np.where(v == 0.0, 0.0, v / mu) for v, mu in ((along, mu_along), (across, friction.sideways))]
+        mu = np.hypot(along, across) / np.hypot(*parts)
+    return np.where(np.isfinite(mu), mu, mu_along)

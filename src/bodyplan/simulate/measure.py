@@ -10,6 +10,7 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.motion import Motion
+from bodyplan.simulate.friction import UPRIGHT
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.model import Physics
 from bodyplan.simulate.reference import Reference
@@ -18,8 +19,6 @@ from bodyplan.spatial.rotations import conjugate, multiply
 
 #: planned advance a cycle below which a motion is not meant to go anywhere, m
 NOWHERE = 1e-9
-#: horizontal part of a unit axis below which a capsule stands upright
-UPRIGHT = 1e-6
 
 
 class Meter:

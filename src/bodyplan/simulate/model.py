@@ -88,7 +88,7 @@ def build(
     and ``arc_joints``.
 
     Raises InputError: a robot without mass or contacts, a wheel-radius drive, inertia that no body can have,
-    scale friction where a floor is not a plane or a contact not a capsule.
+    scale friction where a floor is no plane and no box with a level top, or a contact no capsule and no sphere.
     """
     mj = mujoco()
     spec = mj.MjSpec()

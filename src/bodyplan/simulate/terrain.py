@@ -8,9 +8,10 @@ import numpy as np
 
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Solid
+from bodyplan.robot.elements import Contact
 from bodyplan.robot.model import Robot
 from bodyplan.robot.neighbours import separate_contacts
-from bodyplan.simulate.friction import DEFAULT, Friction, Scales, pair_friction
+from bodyplan.simulate.friction import DEFAULT, Balls, Friction, Runners, Scales, pair_friction
 from bodyplan.simulate.library import mujoco
 from bodyplan.spatial.rotations import rotate
 
@@ -19,6 +20,7 @@ from bodyplan.spatial.rotations import rotate
 CONTACT_STEPS = 6.0
 #: thickness under the lowest point of a height field, m
 FIELD_BASE = 0.5
+LEVEL = (1.0, 0.0, 0.0, 0.0)
 FLOOR_RGBA, WALL_RGBA = (0.62, 0.66, 0.70, 1.0), (0.45, 0.55, 0.65, 0.35)
 
 
@@ -60,10 +62,13 @@ def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: floa
         for solid in solids:
             along, across = pair_friction(solid, contact, friction)
             if isinstance(friction, Friction) and solid.role == "floor":
-                if solid.kind != "plane":
-                    raise InputError(f"friction: scales need a plane floor, {solid.name!r} is a {solid.kind}.")
-                if contact.shape != "capsule" or contact.start == contact.end:
-                    raise InputError(f"friction: scales need capsules, contact {contact.name!r} is none.")
+                if not (solid.kind == "plane" or (solid.kind == "box" and solid.quaternion == LEVEL)):
+                    raise InputError(
+                        "friction: scales need a plane or boxes with level tops as floor, "
+                        f"{solid.name!r} is a {solid.kind}."
+                    )
+                if contact.shape != "sphere" and not _has_axis(contact):
+                    raise InputError(f"friction: scales need capsules or spheres, contact {contact.name!r} is neither.")
             spec.add_pair(
                 name=f"{contact.name} on {solid.name}",
                 geomname1=contact.name,
@@ -90,17 +95,24 @@ def add_self_pairs(spec: Any, robot: Robot) -> None:
 
 def scales_of(model: Any, robot: Robot, solids: tuple[Solid, ...], friction: Friction) -> Scales:
     """The scales of every contact on every floor of a compiled model."""
-    floors = [solid for solid in solids if solid.role == "floor"]
-    pairs = [
-        (model.pair(f"{c.name} on {s.name}").id, model.geom(c.name).id, c, s) for s in floors for c in robot.contacts
-    ]
-    geoms = np.array([geom for _, geom, _, _ in pairs])
-    normals = np.array([rotate(np.array(s.quaternion), np.array([0.0, 0.0, 1.0])) for *_, s in pairs])
-    return Scales(
-        friction,
-        np.array([pair for pair, *_ in pairs]),
-        geoms,
-        model.geom_bodyid[geoms].astype(np.int64),
-        np.array([c.radius for _, _, c, _ in pairs]),
-        normals,
-    )
+    found: dict[bool, list[tuple[Contact, Solid]]] = {}
+    for solid in solids:
+        for contact in robot.contacts:
+            if solid.role == "floor":
+                found.setdefault(solid.kind == "plane" and _has_axis(contact), []).append((contact, solid))
+    parts: list[Runners | Balls] = []
+    for runs, pairs in found.items():
+        geoms = np.array([model.geom(c.name).id for c, _ in pairs])
+        arrays = (
+            np.array([model.pair(f"{c.name} on {s.name}").id for c, s in pairs]),
+            geoms,
+            model.geom_bodyid[geoms].astype(np.int64),
+            np.array([c.radius for c, _ in pairs]),
+            np.array([rotate(np.array(s.quaternion), np.array([0.0, 0.0, 1.0])) for _, s in pairs]),
+        )
+        parts.append(Runners(*arrays) if runs else Balls(*arrays, np.array([_has_axis(c) for c, _ in pairs])))
+    return Scales(friction, parts)
+
+
+def _has_axis(contact: Contact) -> bool:
+    return contact.shape == "capsule" and contact.start != contact.end
