@@ -18,7 +18,7 @@ from bodyplan.spatial.rotations import multiply, quaternion_exp
 
 BOX = ([-5.0] * 3, [5.0] * 3)
 G, MASS, RADIUS = 9.81, 0.7, 0.03
-SCALES = Friction(forward=0.1, backward=0.45, sideways=0.25)
+SCALES = Friction(forward=0.1, backward=0.35, sideways=0.25)
 LEVEL = Profile([(None, 0.0), (4.5, 0.1)])
 
 
@@ -28,7 +28,8 @@ def sled(runner: bool = False) -> Robot:
     feet = [Contact(f"ball{name}", "base", "sphere", RADIUS, start=at) for name, at in places.items()]
     if runner:
         feet[2:] = [Contact("runner", "base", "capsule", RADIUS, start=(0.05, 0.0, 0.0), end=(0.15, 0.0, 0.0))]
-    body = Body(mass=MASS, com=(0.0, 0.0, 0.0), inertia=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0))
+    # as low as the ground, so that pulling does not make it rock
+    body = Body(mass=MASS, com=(0.0, 0.0, -RADIUS), inertia=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0))
     return Robot.from_rows({"mark": [Row(a=0.1)]}, base_body=body, contacts=feet)
 
 
@@ -61,7 +62,7 @@ def test_a_sled_on_balls_resists_as_the_law_says(ground: Ground, angle: float) -
     heading, mu = 0.9, law(angle)
     direction = heading + angle
     resists = mu * MASS * G
-    pull = 1.5 * resists
+    pull = 1.2 * resists  # gently: contacts as stiff as these chatter when they are dragged fast
     way, speed = pulled(sled(), ground, heading, direction, pull)
     along = np.array([np.cos(direction), np.sin(direction), 0.0])
     force = pull - MASS * float(speed @ along) / 0.6
@@ -110,7 +111,7 @@ def test_walls_keep_their_own_friction() -> None:
 
 @pytest.mark.parametrize(("heading", "holds"), [(0.0, False), (np.pi, True), (0.5 * np.pi, False)])
 def test_on_an_incline(heading: float, holds: bool) -> None:
-    angle = 0.35
+    angle = 0.3
     turn = multiply(quaternion_exp([0.0, angle, 0.0]), quaternion_exp([0.0, 0.0, heading]))
     base = np.tile([0.0, 0.0, 0.1, *turn], (2, 1))
     none = np.zeros((2, 0))
@@ -130,10 +131,10 @@ def test_the_law_at_its_edges() -> None:
     ahead = np.array([[0.6, 0.0, 0.8]])  # nose up: seen from above it is x
 
     def mu(velocity: Any, friction: Friction = SCALES, axes: Any = ahead) -> float:
-        return float(directed(friction, np.array([velocity], dtype=float), np.asarray(axes), up)[0])
+        return float(directed(friction, np.array([velocity], dtype=float).T, np.asarray(axes).T, up.T)[0])
 
     assert mu([0.0, 0.0, 0.0]) == 0.1 and mu([0.0, 0.0, -1.0]) == 0.1
-    assert mu([1e-12, 0.0, 0.0]) == pytest.approx(0.1) and mu([-1e-12, 0.0, 0.0]) == pytest.approx(0.45)
+    assert mu([1e-12, 0.0, 0.0]) == pytest.approx(0.1) and mu([-1e-12, 0.0, 0.0]) == pytest.approx(0.35)
     assert mu([0.0, 2.0, 3.0]) == pytest.approx(0.25)
     assert mu([1.0, 1.0, 0.0]) == pytest.approx(np.sqrt(2.0) / np.hypot(10.0, 4.0))
     # no friction one way is none for every motion that has a part of it

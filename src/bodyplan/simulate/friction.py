@@ -114,35 +114,36 @@ class Balls:
         self, pairs: IntArray, geoms: IntArray, bodies: IntArray, radii: Array, normals: Array, capsules: BoolArray
     ) -> None:
         """As of :class:`Runners`; ``capsules`` (c,) True where forward is the axis of the shape."""
-        self.pairs, self.geoms, self.bodies, self.normals, self.capsules = pairs, geoms, bodies, normals, capsules
+        self.pairs, self.geoms, self.bodies, self.normals, self.capsules = pairs, geoms, bodies, normals.T, capsules
         self.down = -radii[:, None] * normals
 
     def update(self, friction: Friction, model: Any, data: Any) -> None:
         """Set both coefficients of every pair."""
-        moving = data.cvel.take(self.bodies, 0)
-        away = data.geom_xpos.take(self.geoms, 0) + self.down - data.subtree_com[1]
-        velocity = moving[:, 3:] + np.cross(moving[:, :3], away)
+        wx, wy, wz, vx, vy, vz = data.cvel.take(self.bodies, 0).T
+        rx, ry, rz = (data.geom_xpos.take(self.geoms, 0) + self.down - data.subtree_com[1]).T
+        velocity = np.stack([vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx])
         axes = np.where(
-            self.capsules[:, None],
-            data.geom_xmat.take(self.geoms, 0)[:, 2::3],
-            data.xmat.take(self.bodies, 0)[:, ::3],
+            self.capsules,
+            data.geom_xmat.take(self.geoms, 0).T[2::3],
+            data.xmat.take(self.bodies, 0).T[::3],
         )
         mu = directed(friction, velocity, axes, self.normals)
-        model.pair_friction[self.pairs, 0] = model.pair_friction[self.pairs, 1] = mu
+        model.pair_friction[self.pairs, :2] = mu[:, None]
 
 
 def directed(friction: Friction, velocity: Array, axes: Array, normals: Array) -> Array:
-    """Coefficients (c,) of the elliptic law of :class:`Balls` for velocities (c, 3) m/s of points on floors with unit
-    ``normals`` (c, 3), forward being ``axes`` (c, 3)."""
-    ahead = axes - (axes * normals).sum(axis=1)[:, None] * normals
-    size = np.linalg.norm(ahead, axis=1)
-    ahead /= np.maximum(size, UPRIGHT)[:, None]
-    along = np.where(size > UPRIGHT, (velocity * ahead).sum(axis=1), 0.0)
-    sliding = velocity - (velocity * normals).sum(axis=1)[:, None] * normals
-    across = np.linalg.norm(sliding - along[:, None] * ahead, axis=1)
+    """Coefficients (c,) of the elliptic law of :class:`Balls` for velocities (3, c) m/s of points on floors with unit
+    ``normals`` (3, c), forward being ``axes`` (3, c)."""
+    ahead = axes - (axes * normals).sum(axis=0) * normals
+    size = np.sqrt((ahead * ahead).sum(axis=0))
+    ahead /= np.maximum(size, UPRIGHT)
+    along = np.where(size > UPRIGHT, (velocity * ahead).sum(axis=0), 0.0)
+    across = velocity - (velocity * normals).sum(axis=0) * normals - along * ahead
+    across = np.sqrt((across * across).sum(axis=0))
     mu_along = np.where(along < 0.0, friction.backward, friction.forward)
     with np.errstate(divide="ignore", invalid="ignore"):
         # a part that does not move asks for nothing, also where its coefficient is 0
-        parts = [np.where(v == 0.0, 0.0, v / mu) for v, mu in ((along, mu_along), (across, friction.sideways))]
-        mu = np.hypot(along, across) / np.hypot(*parts)
+        a = np.where(along == 0.0, 0.0, along / mu_along)
+        c = np.where(across == 0.0, 0.0, across / friction.sideways)
+        mu = np.hypot(along, across) / np.hypot(a, c)
     return np.where(np.isfinite(mu), mu, mu_along)
