@@ -47,4 +47,6 @@ def _gathered(lines: list[Line | None]) -> list[Line]:
 
 
 def _strain(line: Line) -> float:
+    if line.at_least and line.value is not None:
+        return (line.limit or 0.0) - line.value
     return abs(line.value) / line.limit if line.value is not None and line.limit else 0.0

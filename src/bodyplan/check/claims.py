@@ -12,6 +12,8 @@ from bodyplan.arrays import Array
 from bodyplan.check.report import Line
 from bodyplan.errors import UnknownNameError
 from bodyplan.motion import Claim, Motion
+from bodyplan.robot.elements import Contact
+from bodyplan.robot.masses import center_from_poses
 from bodyplan.spatial import apply, rotations
 from bodyplan.spatial.poses import IDENTITY
 
@@ -19,6 +21,10 @@ from bodyplan.spatial.poses import IDENTITY
 SAME_TIME = 1e-9
 #: rad between samples: a body that turns more has no velocity to be told from them
 COARSE = 0.3
+#: slack of a margin, m
+EXACT = 1e-9
+#: points so much higher than the lowest one of a shape, m, are lowest too; a rim so little inclined lies flat
+FLAT = 1e-6
 #: places on a curve that one claim is tested at
 MOST_PLACES = 200_000
 
@@ -206,6 +212,80 @@ def grips(motion: Motion, positions: Array, claim: Claim) -> Line:
     return Line(claim.label, value, limit, "", value <= limit, detail, kind=claim.kind)
 
 
+def lifted(motion: Motion, positions: Array, claim: Claim) -> Line:
+    """Smallest rise of the claimed frames over the higher of their heights at the start and the end of the interval, in
+    every interval that lies inside the motion."""
+    data, t = claim.data, motion.t
+    height = positions[:, [motion.robot.frame_index(name) for name in data["frames"]], 2]
+    start, end, every = float(data["start"]), float(data["end"]), float(data.get("every") or np.inf)
+    found: tuple[float, int, float] | None = None
+    count = 0
+    while end <= t[-1] + SAME_TIME:
+        inside = np.flatnonzero((t > start + SAME_TIME) & (t < end - SAME_TIME))
+        if len(inside) and start >= t[0] - SAME_TIME:
+            stood = np.array([np.interp([start, end], t, z).max() for z in height.T])
+            rise = height[inside].max(axis=0) - stood
+            k, count = int(rise.argmin()), count + 1
+            if found is None or rise[k] < found[0]:
+                found = float(rise[k]), k, start
+        if not np.isfinite(every):
+            break
+        start, end = start + every, end + every
+    if found is None:
+        return _untested(claim, "no sample falls into it")
+    value, k, when = found
+    limit = float(data["height"]) - float(data["tolerance"])
+    detail = f"{data['stage']}, {count} times; least: {data['frames'][k]} from {when:.3g} s on"
+    return Line(claim.label, value, limit, "m", value >= limit, detail, at_least=True, kind=claim.kind)
+
+
+def supported(motion: Motion, positions: Array, claim: Claim) -> Line:
+    """Smallest distance, along the claimed direction, of the centre of mass from the rear and the front end of what
+    carries the robot; negative where it tips."""
+    robot, t = motion.robot, motion.t
+    along, required = np.asarray(claim.data["along"], dtype=np.float64), float(claim.data["required"])
+    if motion.contacts is None or not robot.contacts:
+        return _untested(claim, "the motion does not say which contacts carry load")
+    if robot.mass <= 0.0:
+        return _untested(claim, f"robot {robot.name!r} has no mass")
+    loaded = motion.contacts > 0.5
+    bare = np.flatnonzero(~loaded.any(axis=1))
+    if len(bare):
+        return _failed(claim, f"at {t[bare[0]]:.4g} s nothing carries the robot ({len(bare)} samples)")
+    poses = motion.poses()
+    rear, front = np.full(len(t), np.inf), np.full(len(t), -np.inf)
+    for contact, carries in zip(robot.contacts, loaded.T, strict=True):
+        low, high = footing(contact, poses[contact.frame], along)
+        rear, front = np.where(carries, np.minimum(rear, low), rear), np.where(carries, np.maximum(front, high), front)
+    centre = center_from_poses(robot, poses.array) @ along
+    margin = np.minimum(centre - rear, front - centre)
+    k = int(margin.argmin())
+    value = float(margin[k])
+    ahead = front[k] - centre[k] < centre[k] - rear[k]
+    detail = f"least at {t[k]:.4g} s, to the {'front' if ahead else 'rear'}"
+    if value < 0.0:
+        detail = f"tips {'forward' if ahead else 'backward'} at {t[k]:.4g} s"
+    return Line(claim.label, value, required, "m", value >= required - EXACT, detail, at_least=True, kind=claim.kind)
+
+
+def footing(contact: Contact, pose: Array, along: Array) -> tuple[Array, Array]:
+    """Smallest and largest coordinate (T,) m, along a horizontal unit vector (3,), of the lowest points of a contact
+    shape on a frame with poses (T, 7)."""
+    if contact.shape == "rim":
+        axis = rotations.rotate(pose[:, 3:], np.array([0.0, 0.0, 1.0]))
+        down = axis[:, 2:] * axis - np.array([0.0, 0.0, 1.0])
+        steep = np.linalg.norm(down, axis=1)
+        lies = steep < FLAT  # then all of the circle is lowest
+        to_lowest = contact.radius * (down @ along) / np.where(lies, 1.0, steep)
+        centre, half = apply(pose, contact.start) @ along, np.where(lies, contact.radius, 0.0)
+        middle = centre + np.where(lies, 0.0, to_lowest)
+        return middle - half, middle + half
+    places = apply(pose[:, None], contact.points())
+    lowest = places[..., 2] <= places[..., 2].min(axis=1, keepdims=True) + FLAT
+    coordinate = places @ along
+    return np.where(lowest, coordinate, np.inf).min(axis=1), np.where(lowest, coordinate, -np.inf).max(axis=1)
+
+
 def _failed(claim: Claim, why: str) -> Line:
     return Line(claim.label, None, None, "", False, why, kind=claim.kind)
 
@@ -221,6 +301,8 @@ TESTS: dict[str, Callable[[Motion, Array, Claim], Line]] = {
     "follows": follows,
     "no_slip": no_slip,
     "grips": grips,
+    "lifted": lifted,
+    "supported": supported,
 }
 
 #: claims that a general test looks up
