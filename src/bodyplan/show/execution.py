@@ -31,6 +31,7 @@ MANY = 8
 #: key of Trial.metrics -> (what it is, unit)
 MEASURES = {
     "turned_rad": ("turned to the left of the planned heading, last cycle", "°"),
+    "tilt_rad": ("tilted from the planned base, largest", "°"),
     "slip_angle_rad": ("slip angle: how far the body moves across its own axis", "°"),
     "tracking_rms_rad": ("servo error, rms", "rad"),
     "tracking_max_rad": ("servo error, largest", "rad"),
@@ -109,6 +110,11 @@ def _figures(trial: Trial, playback: Playback) -> list[tuple[str, str, str, str]
     if ratio is not None:
         no_slip = playback.motion.facts["no_slip_speed"]
         rows.append(("speed against that without slip", figure(no_slip, "m/s"), figure(reached, "m/s"), percent(ratio)))
+    lifts = [lift for lift in trial.lifts if lift.planned > 0.0]
+    if lifts:
+        least = min(lifts, key=lambda lift: lift.executed / lift.planned)
+        rise, made = figure(least.planned, "m"), figure(least.executed, "m")
+        rows.append(("rise of the part that is lifted least", rise, made, percent(trial.lift_ratio)))
     return rows + [(what, "", _measure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if key in found]
 
 

@@ -61,7 +61,7 @@ class Playback:
             phase = _phase(trial, reference, trial.t[chosen])
             executed = motion.robot.forward(trial.q[chosen], trial.base[chosen]).array
             executed_centre = centre_of_mass(motion.robot, executed)
-        base = np.array([reference.base(p) for p in phase])
+        base = reference.bases(phase)
         planned = motion.robot.forward(reference.joints(phase), base).array
         period = reference.period
         steps = np.diff(_centres(reference, np.arange(cycles + 1.0) * reference.duration), axis=0)
@@ -124,7 +124,7 @@ def centre_of_mass(robot: Robot, poses: Array) -> Array:
 
 def _centres(reference: Reference, phase: Array) -> Array:
     robot = reference.motion.robot
-    base = np.array([reference.base(p) for p in phase])
+    base = reference.bases(phase)
     return centre_of_mass(robot, robot.forward(reference.joints(phase), base).array)
 
 

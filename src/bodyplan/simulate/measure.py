@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.motion import Motion
+from bodyplan.motion import Claim, Motion
 from bodyplan.simulate.friction import UPRIGHT
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.model import Physics
 from bodyplan.simulate.reference import Reference
-from bodyplan.simulate.trial import Slip
-from bodyplan.spatial.rotations import conjugate, multiply
+from bodyplan.simulate.trial import Lift, Slip
+from bodyplan.spatial.rotations import conjugate, multiply, rotate
 
 #: planned advance a cycle below which a motion is not meant to go anywhere, m
 NOWHERE = 1e-9
@@ -146,8 +146,7 @@ def turned_of(
         first = start + cycle * period
         some = np.flatnonzero((records.t >= first) & (records.t <= first + period))
         some = some[:: max(1, len(some) // 100)]
-        phases = phase(records.t[some])
-        planned = np.array([reference.base(phase)[3:] for phase in phases]).reshape(-1, 4)
+        planned = reference.bases(phase(records.t[some]))[:, 3:]
         w, _, _, z = multiply(records.base[some, 3:], conjugate(planned)).T
         # turning by the double angle makes q and -q one, and means of angles well defined
         out[cycle] = np.angle(np.sum((w + 1j * z) ** 2))
@@ -160,6 +159,16 @@ def directions(planned: Array) -> Array:
     return np.where(size > NOWHERE, planned / np.maximum(size, NOWHERE), np.array([1.0, 0.0, 0.0]))
 
 
+def tilt_of(records: Records, reference: Reference, phase: Callable[[Array], Array], start: float) -> float:
+    """Largest angle rad from ``start`` s on between the planned and the executed z axis of the base."""
+    some = records.t >= start - 1e-9
+    up = np.array([0.0, 0.0, 1.0])
+    planned = rotate(reference.bases(phase(records.t[some]))[:, 3:], up)
+    executed = rotate(records.base[some, 3:], up)
+    sine = np.linalg.norm(np.cross(planned, executed), axis=1)
+    return float(np.max(np.arctan2(sine, np.sum(planned * executed, axis=1)), initial=0.0))
+
+
 def slips_of(
     motion: Motion, records: Records, planned: Array, time_of: Callable[[float], float], period: float
 ) -> tuple[Slip, ...]:
@@ -170,32 +179,72 @@ def slips_of(
     if not claims:
         return ()
     positions = motion.robot.forward(records.q, records.base).positions
-    ahead, last = directions(planned), float(records.t[-1]) + 1e-9 * period
+    ahead = directions(planned)
     out = []
     for claim in claims:
-        frames = [motion.robot.frame_index(name) for name in claim.data["frames"]]
-        tracks = positions[:, frames]
-        stage = str(claim.data.get("stage", claim.label))
-        start, end = (float(claim.data[key]) - float(motion.t[0]) for key in ("start", "end"))
-        # a window before the first sample comes again a period later; one that is cut in two is left out
-        every = float(claim.data.get("every") or np.inf)
-        if start < -1e-9 and np.isfinite(every):
-            later = np.ceil(-start / every - 1e-9) * every
-            start, end = start + later, end + later
-        if start < -1e-9:
-            continue
-        begin, stop = time_of(max(start, 0.0)), time_of(end)
-        for cycle in range(len(planned)):
-            t0, t1 = begin + cycle * period, stop + cycle * period
-            if t1 > last or t1 <= t0:
-                continue
-            between = records.t[(records.t > t0) & (records.t < t1)]
-            moved = at(records.t, tracks, np.concatenate([[t0], between, [t1]]))
+        tracks = positions[:, [motion.robot.frame_index(name) for name in claim.data["frames"]]]
+        for cycle, times in _intervals(motion, claim, records, time_of, period, len(planned)):
+            moved = at(records.t, tracks, times)
             moved -= moved[0].copy()
             along = float(np.mean(moved[-1] @ ahead[cycle]))
             largest = float(np.max(np.linalg.norm(moved, axis=-1)))
-            out.append(Slip(stage, claim.label, cycle, t0, t1, along, largest))
+            stage = str(claim.data.get("stage", claim.label))
+            out.append(Slip(stage, claim.label, cycle, float(times[0]), float(times[-1]), along, largest))
     return tuple(out)
+
+
+def lifts_of(
+    motion: Motion,
+    records: Records,
+    reference: Reference,
+    phase: Callable[[Array], Array],
+    time_of: Callable[[float], float],
+    period: float,
+    cycles: int,
+) -> tuple[Lift, ...]:
+    """What the ``lifted`` claims of the motion became, cycle by cycle, as :func:`slips_of`. ``phase``: that of the
+    motion at times (k,) of the trial. Intervals without a record inside are left out."""
+    claims = [claim for claim in motion.claims if claim.kind == "lifted"]
+    if not claims:
+        return ()
+    robot = motion.robot
+    heights = robot.forward(records.q, records.base).positions[..., 2]
+    out = []
+    for claim in claims:
+        frames = [robot.frame_index(name) for name in claim.data["frames"]]
+        for cycle, times in _intervals(motion, claim, records, time_of, period, cycles):
+            if len(times) < 3:
+                continue
+            phases = phase(times)
+            plan = robot.forward(reference.joints(phases), reference.bases(phases)).positions[:, frames, 2]
+            stood = np.maximum(plan[0], plan[-1])
+            made = at(records.t, heights[:, frames], times)
+            planned, executed = (float((z - stood).max(axis=0).min()) for z in (plan, made))
+            stage = str(claim.data.get("stage", claim.label))
+            out.append(Lift(stage, claim.label, cycle, float(times[0]), float(times[-1]), planned, executed))
+    return tuple(out)
+
+
+def _intervals(
+    motion: Motion, claim: Claim, records: Records, time_of: Callable[[float], float], period: float, cycles: int
+) -> Iterator[tuple[int, Array]]:
+    """(cycle, times (k,) s): the interval of a claim in every cycle of the trial, its start and end and the records
+    between them."""
+    last = float(records.t[-1]) + 1e-9 * period
+    start, end = (float(claim.data[key]) - float(motion.t[0]) for key in ("start", "end"))
+    # a window before the first sample comes again a period later; one that is cut in two is left out
+    every = float(claim.data.get("every") or np.inf)
+    if start < -1e-9 and np.isfinite(every):
+        later = np.ceil(-start / every - 1e-9) * every
+        start, end = start + later, end + later
+    if start < -1e-9:
+        return
+    begin, stop = time_of(max(start, 0.0)), time_of(end)
+    for cycle in range(cycles):
+        t0, t1 = begin + cycle * period, stop + cycle * period
+        if t0 < t1 <= last:
+            between = records.t[(records.t > t0) & (records.t < t1)]
+            yield cycle, np.concatenate([[t0], between, [t1]])
 
 
 def at(t: Array, values: Array, times: Array) -> Array:

@@ -56,18 +56,24 @@ class Reference:
 
     def base(self, phase: float) -> Array:
         """Planned pose (7,) of the base at one phase, cycles before and after the first included."""
-        cycle, time = self._within(np.asarray(float(phase)))
-        pose = self._sample(float(time))
+        return np.asarray(self.bases(np.array([float(phase)]))[0])
+
+    def bases(self, phases: ArrayLike) -> Array:
+        """Planned poses (k, 7) of the base at phases (k,), cycles before and after the first included."""
+        cycle, time = self._within(np.asarray(phases, dtype=np.float64))
+        poses = self._samples(time)
         if self.period is None:
-            return pose
-        first, last = self._sample(0.0), self._sample(self.period)
+            return poses
+        first, last = self._samples(np.array([0.0, self.period]))
         # world motion of one cycle: last = step * first
         turn = multiply(last[3:], conjugate(first[3:]))
         step = np.concatenate([last[:3] - rotate(turn, first[:3]), turn])
-        if cycle < 0:
-            step = np.concatenate([-rotate(conjugate(turn), step[:3]), conjugate(turn)])
-        pose = _compose(_power(step, abs(int(cycle))), pose)
-        return np.concatenate([pose[:3], canonical(pose[3:])])
+        back = np.concatenate([-rotate(conjugate(turn), step[:3]), conjugate(turn)])
+        for number in np.unique(cycle):
+            mine = cycle == number
+            poses[mine] = _compose(_power(back if number < 0 else step, abs(int(number))), poses[mine])
+        poses[:, 3:] = canonical(poses[:, 3:])
+        return poses
 
     def _within(self, phase: Array) -> tuple[Array, Array]:
         """(cycle number, s since its start)."""
@@ -76,19 +82,20 @@ class Reference:
         cycle = np.floor(phase / self.period)
         return cycle, np.clip(phase - cycle * self.period, 0.0, self.period)
 
-    def _sample(self, time: float) -> Array:
-        """Base pose (7,) at ``time`` s after the first sample: between samples linear, turning evenly."""
+    def _samples(self, times: Array) -> Array:
+        """Base poses (k, 7) at ``times`` (k,) s after the first sample: between samples linear, turning evenly."""
         t, base = self.motion.t, self.motion.base
-        i = int(np.clip(np.searchsorted(t, t[0] + time, side="right") - 1, 0, len(t) - 2))
-        s = min(max((t[0] + time - t[i]) / (t[i + 1] - t[i]), 0.0), 1.0)
+        i = np.clip(np.searchsorted(t, t[0] + times, side="right") - 1, 0, len(t) - 2)
+        s = np.clip((t[0] + times - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)[:, None]
         a, b = base[i], base[i + 1]
-        step = quaternion_log(multiply(conjugate(a[3:]), b[3:]))
-        return np.concatenate([a[:3] + s * (b[:3] - a[:3]), multiply(a[3:], quaternion_exp(s * step))])
+        step = quaternion_log(multiply(conjugate(a[:, 3:]), b[:, 3:]))
+        turned = multiply(a[:, 3:], quaternion_exp(s * step))
+        return np.concatenate([a[:, :3] + s * (b[:, :3] - a[:, :3]), turned], axis=1)
 
 
 def _compose(a: Array, b: Array) -> Array:
-    """The rigid motion (7,) b followed by a."""
-    return np.concatenate([a[:3] + rotate(a[3:], b[:3]), multiply(a[3:], b[3:])])
+    """The rigid motions (..., 7) b followed by a (7,)."""
+    return np.concatenate([a[:3] + rotate(a[3:], b[..., :3]), multiply(a[3:], b[..., 3:])], axis=-1)
 
 
 def _power(step: Array, times: int) -> Array:
@@ -113,6 +120,6 @@ def region(reference: Reference, cycles: int) -> tuple[Array, Array]:
     path = motion.base[:, :3]
     if reference.period is not None:
         phases = np.linspace(0.0, cycles * reference.period, 8 * min(cycles, 64) + 1)
-        path = np.concatenate([path, np.array([reference.base(p)[:3] for p in phases])])
+        path = np.concatenate([path, reference.bases(phases)[:, :3]])
     margin = 2.0 * reach + 2.0 * size + 0.1
     return path.min(axis=0) - margin, path.max(axis=0) + margin

@@ -14,7 +14,15 @@ from bodyplan.motion import Motion
 from bodyplan.simulate.friction import FloorFriction, Friction, as_friction
 from bodyplan.simulate.library import mujoco, warnings_kept
 from bodyplan.simulate.loop import Run, Timing
-from bodyplan.simulate.measure import cost_of_transport, planned_advance, progress_of, slips_of, turned_of
+from bodyplan.simulate.measure import (
+    cost_of_transport,
+    lifts_of,
+    planned_advance,
+    progress_of,
+    slips_of,
+    tilt_of,
+    turned_of,
+)
 from bodyplan.simulate.model import Physics, Servo, build
 from bodyplan.simulate.reference import Reference, region
 from bodyplan.simulate.start import Walls, on_the_floor
@@ -108,7 +116,9 @@ def simulate(
         measures |= {
             "turned": turned_of(records, reference, timing.phase, start, period, cycles),
             "slip_angle": run.sliding.angle,
+            "tilt": tilt_of(records, reference, timing.phase, start),
             "slips": slips_of(motion, records, planned, timing.time_of, period),
+            "lifts": lifts_of(motion, records, reference, timing.phase, timing.time_of, period, cycles),
             "positive_work": positive,
             "absolute_work": absolute,
             "cost_of_transport": cost_of_transport(positive, weight, measures["speed"] * cycles * period),

@@ -30,6 +30,24 @@ class Slip:
     largest: float
 
 
+@dataclass(frozen=True)
+class Lift:
+    """How far frames rose that the plan claims to lift, over one interval of one cycle.
+
+    ``stage`` and ``label`` are those of the claim, ``start`` and ``end`` in s of the trial. ``planned`` and
+    ``executed`` m: the largest rise of a frame above the higher of its planned heights at start and end, the smallest
+    over the frames. Negative where a frame never came up to where it was planned to stand.
+    """
+
+    stage: str
+    label: str
+    cycle: int
+    start: float
+    end: float
+    planned: float
+    executed: float
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A motion as MuJoCo executed it. All arrays are read-only; quantities that do not exist are None.
@@ -44,7 +62,8 @@ class Trial:
     is planned. ``sideways`` (cycles,) m: horizontal, positive to the left of the planned direction.
     ``speed`` m/s: mean, along the planned direction. ``turned`` (cycles,) rad in (-pi, pi]: how far the base is
     turned about z from the planned one, mean over each cycle: a body may swing round while it starts and then keep
-    its heading. ``slips``: see :class:`Slip`.
+    its heading. ``tilt`` rad: largest angle between the planned and the executed z axis of the base. ``slips`` and
+    ``lifts``: see :class:`Slip` and :class:`Lift`.
 
     ``slip_angle`` rad in [0, pi/2]: atan2(sum of \\|v across\\|, sum of \\|v along\\|) of the velocities of the middles
     of those capsules that touch the ground, horizontal, across and along their axes, over the records of the
@@ -76,8 +95,10 @@ class Trial:
     sideways: Array | None = None
     speed: float | None = None
     turned: Array | None = None
+    tilt: float | None = None
     slip_angle: float | None = None
     slips: tuple[Slip, ...] = ()
+    lifts: tuple[Lift, ...] = ()
     tracking_rms: Array | None = None
     tracking_max: Array | None = None
     torque_rms: Array | None = None
@@ -122,6 +143,11 @@ class Trial:
         """Largest torque (N m; force in N) of any joint in the measured part; None where the run diverged."""
         return None if self.torque_peak is None else float(self.torque_peak.max(initial=0.0))
 
+    @property
+    def lift_ratio(self) -> float | None:
+        """Smallest rise executed / planned of all ``lifts``; None where none is planned or the run diverged."""
+        return min((lift.executed / lift.planned for lift in self.lifts if lift.planned > 0.0), default=None)
+
     def slip_by_stage(self) -> dict[str, dict[str, float]]:
         """Stage -> ``along`` (m a cycle: summed over its claims, mean over cycles) and ``largest`` (m), in
         the order of the claims."""
@@ -147,7 +173,9 @@ class Trial:
             "advance_ratio": self.advance_ratio,
             "forward_ratio": self.forward_ratio,
             "turned_rad": None if self.turned is None else float(self.turned[-1]),
+            "tilt_rad": self.tilt,
             "slip_angle_rad": self.slip_angle,
+            "lift_ratio": self.lift_ratio,
             "sideways_m": None if self.sideways is None else float(self.sideways.mean()),
             "speed_m_s": self.speed,
         }
