@@ -180,7 +180,7 @@ class Run:
     def _record(self, t: float) -> None:
         i, data = self._count, self.data
         self._t[i], self._com[i], self._force[i] = t, data.subtree_com[1], data.actuator_force
-        self._airborne += int(data.ncon == 0)
+        self._airborne += int(data.ncon == 0 and i > 0)  # at first it just touches, which is no contact yet
         if t >= self.timing.start_time:
             self.sliding.add(data)
         self._count = i + 1
