@@ -20,6 +20,10 @@ class Status(StrEnum):
     CURVE_ENDED = "curve_ended"  # the curve is shorter than the body
     NO_EXACT_LENGTH = "no_exact_length"  # no link length covers the contracted curve exactly
     OUT_OF_REACH = "out_of_reach"
+    COLLAPSED = "collapsed"  # two anchors are nearer to each other than the links between them can fold
+    WRONG_ORDER = "wrong_order"  # an anchor is not ahead of the one behind it
+    NOT_COPLANAR = "not_coplanar"  # points that must lie in one upright plane do not
+    LINKS_CROSSING = "links_crossing"
     NO_CONTACT = "no_contact"
     LIMIT = "limit"
     SLIPS = "slips"

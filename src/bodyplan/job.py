@@ -49,7 +49,7 @@ def _silent(step: str, part: float) -> None:
 
 def mission_times(mission: Mission) -> Array:
     """Times of a mission (T,) s: whole steps a cycle, so that samples one cycle apart can be compared."""
-    period = mission.gait.period(mission.robot)
+    period = mission.gait.period(mission.robot, mission.ground)
     time = mission.time
     if period is None:
         if time.stop is None:
@@ -115,7 +115,7 @@ def _variants(mission: Mission, t: Array) -> tuple[Variant, ...]:
 
 def mission_times_of(gait: Any, mission: Mission, t: Array) -> Array:
     """Even times of one cycle of a variant, as finely sampled as the mission."""
-    period = gait.period(mission.robot) or float(t[-1])
+    period = gait.period(mission.robot, mission.ground) or float(t[-1])
     steps = max(8, round(period / float(t[1] - t[0])))
     return np.linspace(0.0, period, steps + 1)
 

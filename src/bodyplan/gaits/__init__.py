@@ -2,6 +2,7 @@
 
 from bodyplan.gaits.base import Gait
 from bodyplan.gaits.concertina import Concertina
+from bodyplan.gaits.rectilinear import Rectilinear
 from bodyplan.gaits.rolling import Rolling
 from bodyplan.gaits.serpentine import Serpentine
 from bodyplan.gaits.sidewinding import Sidewinding
@@ -9,7 +10,7 @@ from bodyplan.gaits.sinuslifting import SinusLifting
 
 #: every gait by its name in mission files
 KINDS: dict[str, type[Gait]] = {
-    gait.kind: gait for gait in (Concertina, Serpentine, SinusLifting, Sidewinding, Rolling)
+    gait.kind: gait for gait in (Concertina, Serpentine, SinusLifting, Sidewinding, Rolling, Rectilinear)
 }
 
-__all__ = ["KINDS", "Concertina", "Gait", "Rolling", "Serpentine", "Sidewinding", "SinusLifting"]
+__all__ = ["KINDS", "Concertina", "Gait", "Rectilinear", "Rolling", "Serpentine", "Sidewinding", "SinusLifting"]

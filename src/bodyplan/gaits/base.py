@@ -32,8 +32,9 @@ class Gait(ABC):
         """The motion at times t (T,) s. Raises InputError where robot or ground cannot do this gait at all;
         samples that fail have a status."""
 
-    def period(self, robot: Robot) -> float | None:
-        """Time in s after which the gait repeats with this robot; None for a gait that does not."""
+    def period(self, robot: Robot, ground: Ground | None = None) -> float | None:
+        """Time in s after which the gait repeats with this robot on this ground (None: level, without a ceiling); None
+        for a gait that does not."""
         return None
 
     def variants(self) -> dict[str, Gait]:

@@ -144,7 +144,7 @@ class Concertina(Gait):
         """The gait fitted to one robot: unit, contracted pose, sweep and cycle. Raises InputError or SolveError."""
         return _fitted(self, robot)
 
-    def period(self, robot: Robot) -> float:
+    def period(self, robot: Robot, ground: Ground | None = None) -> float:
         """Time of one cycle, s: a sweep, or its share between two waves."""
         return self.body(robot).cycle.period
 

@@ -121,7 +121,7 @@ class Rolling(Gait):
         """The body curve at time t s."""
         return Spiral(self.curvature, self.twist, length, phase=self.phase + self.rate * t)
 
-    def period(self, robot: Robot) -> float:
+    def period(self, robot: Robot, ground: Ground | None = None) -> float:
         """Time of one turn of the sections, s."""
         return 2.0 * np.pi / abs(self.rate)
 

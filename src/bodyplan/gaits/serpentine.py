@@ -170,7 +170,7 @@ class Serpentine(Gait):
         fixed = not self.changes and not isinstance(self.steer, tuple)
         return fixed and self.curve.untwisted().period is not None
 
-    def period(self, robot: Robot) -> float | None:
+    def period(self, robot: Robot, ground: Ground | None = None) -> float | None:
         """Time of one cycle, s: a period of the curve over the speed; None where nothing repeats."""
         if not self._repeats or not self.pace.steady:
             return None

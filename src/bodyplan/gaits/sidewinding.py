@@ -125,7 +125,7 @@ class Sidewinding(Gait):
         """The wave from its place ``at`` m on: the compound serpenoid with the torsion that keeps it level."""
         return _wave(self, self.torsion, at)
 
-    def period(self, robot: Robot) -> float:
+    def period(self, robot: Robot, ground: Ground | None = None) -> float:
         """Time of one cycle, s: the wavelength over the speed."""
         return self.wavelength / self.pace.speed
 

@@ -1,0 +1,114 @@
+"""Statics of a snake on its anchors: what each of them carries, and the torque that holds every pitch joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray
+from bodyplan.fitting.mechanism import PITCH, mechanism
+from bodyplan.gaits.rectilinear.snake import InchingSnake
+from bodyplan.robot.masses import center_from_poses, mass_points
+from bodyplan.spatial import rotate
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True, eq=False)
+class Holding:
+    """``loads`` (T, N) N, upright, of the anchors, negative where the ground would have to pull; ``torques`` (T, n)
+    N m of the joint coordinates; ``center`` (T,) m: centre of mass along the way; ``margin`` (T,) m: from there to the
+    nearer of the rearmost and the foremost standing anchor, negative where the snake tips."""
+
+    loads: Array
+    torques: Array
+    center: Array
+    margin: Array
+
+
+def holding(snake: InchingSnake, poses: Array, along: Array, anchors: Array, standing: BoolArray) -> Holding | None:
+    """Statics at ``poses`` (T, F, 7) of the robot's frames, on level treads and without friction.
+
+    ``along`` (3,): the way forward; ``anchors`` (T, N) m along it; ``standing`` (T, N). Two standing anchors leave no
+    choice. With more, the loads are those that hold with the least sum of squared torques, none of them pulling: what
+    equally stiff servos settle at. None for a robot without masses.
+    """
+    robot = snake.robot
+    frames, masses, centres = mass_points(robot)
+    if not len(frames) or not masses.sum() > 0.0:
+        return None
+    places = (poses[:, frames, :3] + rotate(poses[:, frames, 3:], centres)) @ along
+    center = center_from_poses(robot, poses) @ along
+    made = mechanism(robot)
+    pitch = made.joints_of(PITCH)
+    at_rest = made.places[made.joint_place[pitch]]
+    rest = robot.forward(np.zeros(robot.n))
+    joint_frames = [int(np.argmin(np.abs(rest.positions[:, 0] - x))) for x in at_rest]
+    joints = poses[:, joint_frames, :3] @ along
+    body_rest = rest.positions[frames, 0] + rotate(rest.array[frames, 3:], centres)[:, 0]
+    ahead = body_rest[None, :] > at_rest[:, None]
+    anchor_rest = made.places[made.joint_place[snake.columns[0::2]]]
+    # an anchor's load acts on the link behind its joint
+    loaded = anchor_rest[None, :] > at_rest[:, None] + 1e-12 * made.length
+    weights = masses * GRAVITY
+    # torque that a joint must give, nose-up, to carry what is ahead of it
+    weight = np.einsum("jb,tjb->tj", ahead * weights, places[:, None, :] - joints[:, :, None])
+    arms = np.where(loaded, anchors[:, None, :] - joints[:, :, None], 0.0)
+    total = float(weights.sum())
+    loads = np.zeros(anchors.shape)
+    for pattern in np.unique(standing, axis=0):
+        rows = np.flatnonzero((standing == pattern).all(axis=1))
+        feet = np.flatnonzero(pattern)
+        if len(feet):
+            loads[np.ix_(rows, feet)] = _loads(
+                anchors[rows][:, feet], center[rows], total, weight[rows], arms[rows][:, :, feet]
+            )
+    torque = weight - np.einsum("tjk,tk->tj", arms, loads)
+    torques = np.zeros((len(center), robot.n))
+    torques[:, pitch] = -made.gain[pitch] * torque
+    return Holding(loads, torques, center, support_margin(anchors, center, standing))
+
+
+def support_margin(anchors: Array, center: Array, standing: BoolArray) -> Array:
+    """(T,) m: from the ``center`` (T,) of mass to the nearer end of the standing anchors (T, N) along the way, negative
+    beyond them; minus infinity where none stands."""
+    rear = np.where(standing, anchors, np.inf).min(axis=-1)
+    front = np.where(standing, anchors, -np.inf).max(axis=-1)
+    return np.asarray(np.minimum(center - rear, front - center))
+
+
+def _loads(feet: Array, center: Array, total: float, weight: Array, arms: Array) -> Array:
+    """Loads (R, k) of anchors at ``feet`` (R, k) for torques weight - arms @ loads (R, j)."""
+    k = feet.shape[1]
+    if k == 1:
+        return np.full(feet.shape, total)
+    away = feet - center[:, None]
+    # sum of loads = total and no moment about the centre of mass, scaled to like sizes
+    size = np.maximum(np.abs(away).max(axis=1), 1e-300)
+    balance = np.stack([np.ones_like(away), away / size[:, None]], axis=1)
+    wanted = np.zeros((len(feet), 2))
+    wanted[:, 0] = total
+    out = _least(balance, wanted, weight, arms)
+    for row in np.flatnonzero((out.min(axis=1) < -1e-12 * total) & (k > 2)):
+        keep, one = np.arange(k), slice(row, row + 1)
+        part = out[row]
+        while len(keep) > 2 and part.min() < -1e-12 * total:
+            keep = np.delete(keep, int(part.argmin()))
+            part = _least(balance[one][:, :, keep], wanted[one], weight[one], arms[one][:, :, keep])[0]
+        out[row] = 0.0
+        out[row, keep] = part
+    return out
+
+
+def _least(balance: Array, wanted: Array, weight: Array, arms: Array) -> Array:
+    """Loads (R, k) with ``balance`` (R, 2, k) loads = ``wanted`` and the least |weight - arms loads|."""
+    some: Array = np.einsum("rki,ri->rk", np.linalg.pinv(balance), wanted)
+    k = balance.shape[2]
+    if k == 2:
+        return some
+    _, _, basis = np.linalg.svd(balance)
+    free = np.swapaxes(basis[:, 2:], -1, -2)  # (R, k, k - 2): what changes neither sum nor moment
+    left = weight - np.einsum("rjk,rk->rj", arms, some)
+    mix = np.einsum("rki,ri->rk", np.linalg.pinv(arms @ free), left)
+    return np.asarray(some + np.einsum("rki,ri->rk", free, mix))

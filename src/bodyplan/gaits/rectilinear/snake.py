@@ -1,0 +1,146 @@
+"""A snake as anchors and elbows: which of its pitch joints stand, and what lies between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bodyplan.arrays import Array, IntArray
+from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.fitting.mechanism import PITCH, mechanism
+from bodyplan.gaits.planar import resting_radius
+from bodyplan.gaits.rectilinear.demands import Demands
+from bodyplan.robot.elements import Contact
+from bodyplan.robot.model import Robot
+
+#: share by which feet keep more apart than their radii
+APART = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class InchingSnake:
+    """The pitch joints of a snake that N anchors use, 2 N - 1 of them, tail first, and the body between them.
+
+    ``columns`` (2 N - 1,) of q; ``gain`` (2 N - 1,): nose-up angle per unit of q. ``links`` (2 N - 2,), ``tail`` and
+    ``head`` m: lengths between them and beyond. ``frames`` (2 N - 1,) names of frames at the joints. ``contacts``:
+    indices among ``robot.contacts`` of those at each joint. ``rest`` m: height of an anchor's axis above the floor;
+    ``top`` m: radius of the body at an elbow; ``body`` m: largest radius of the links. ``nearest`` m: smallest spacing
+    at which feet and links of a leg are clear of each other.
+    """
+
+    robot: Robot
+    columns: IntArray
+    gain: Array
+    links: Array
+    tail: float
+    head: float
+    frames: tuple[str, ...]
+    contacts: tuple[tuple[int, ...], ...]
+    rest: float
+    top: float
+    body: float
+    nearest: float
+
+    @property
+    def anchors(self) -> int:
+        """N."""
+        return (len(self.columns) + 1) // 2
+
+    @classmethod
+    def of(cls, robot: Robot, anchors: int, joints: Sequence[str] | None) -> InchingSnake:
+        """The snake in ``robot``: its pitch joints named by ``joints``, or 2 N - 1 of them spread evenly from the first
+        to the last. InputError where there are too few, or for a robot that is no straight snake."""
+        made = mechanism(robot)
+        if made.kind != "straight":
+            raise InputError(f"Rectilinear: needs rigid links; {robot.name!r} bends by {made.kind} joints.")
+        pitch = made.joints_of(PITCH)
+        names = [made.joints[int(j)] for j in pitch]
+        need = 2 * anchors - 1
+        if joints is not None:
+            for name in joints:
+                if name not in names:
+                    raise UnknownNameError("pitch joint", name, names, where="Rectilinear: joints")
+            order = [names.index(name) for name in joints]
+            if order != sorted(set(order)):
+                raise InputError(f"Rectilinear: joints must run from tail to head, got {list(joints)!r}.")
+            chosen = pitch[order]
+        else:
+            if len(pitch) < need:
+                raise InputError(
+                    f"Rectilinear: {anchors} anchors need {need} pitch joints, {robot.name!r} has {len(pitch)}; for "
+                    f'example bp.snake({2 * need}, 0.1, axes="alternating", first="pitch") or fewer anchors.'
+                )
+            chosen = pitch[np.round(np.linspace(0, len(pitch) - 1, need)).astype(np.int64)]
+        places = made.places[made.joint_place[chosen]]
+        stations = np.concatenate([[0.0], places, [made.length]])
+        lengths = np.diff(stations)
+        if np.any(lengths[1:-1] <= 0.0):
+            raise InputError(f"Rectilinear: two pitch joints of {robot.name!r} are in one place.")
+        rest = robot.forward(np.zeros(robot.n)).positions[:, 0]
+        frames = tuple(robot.frames[int(np.argmin(np.abs(rest - x)))] for x in places)
+        at = tuple(_at(robot, frame) for frame in frames)
+        radii = [max((robot.contacts[k].radius for k in some), default=0.0) for some in at]
+        body = max((c.radius for c in robot.contacts if c.shape == "capsule"), default=0.0)
+        return cls(
+            robot,
+            chosen,
+            -made.gain[chosen],
+            lengths[1:-1],
+            float(lengths[0]),
+            float(lengths[-1]),
+            frames,
+            at,
+            resting_radius(robot),
+            max([body, *radii[1::2]]),
+            body,
+            _nearest(rest, places, max(radii[0::2], default=0.0), body),
+        )
+
+    def demands(self, ceiling: float) -> Demands:
+        """What this snake allows under a ceiling (m above the line of the anchors' axes)."""
+        robot = self.robot
+        low, high = (robot.limits[self.columns, side] * self.gain for side in (0, 1))
+        return Demands(
+            self.links,
+            ceiling,
+            np.stack([np.minimum(low, high), np.maximum(low, high)], axis=-1),
+            robot.rates[self.columns] * np.abs(self.gain),
+            self.nearest,
+        )
+
+    def q(self, bends: Array) -> Array:
+        """Joint coordinates (..., n) from nose-up angles (..., 2 N - 1), or their derivatives; other joints are 0."""
+        out = np.zeros((*bends.shape[:-1], self.robot.n))
+        out[..., self.columns] = bends / self.gain
+        return out
+
+
+def _at(robot: Robot, frame: str) -> tuple[int, ...]:
+    """Contacts at the origin of a frame: its feet, or else the end of a capsule there."""
+    mine = [(k, c) for k, c in enumerate(robot.contacts) if c.frame == frame]
+    feet = [k for k, c in mine if c.shape == "sphere" and _ahead(c) == 0.0]
+    return tuple(feet) or tuple(k for k, c in mine if c.shape == "capsule" and _ahead(c) == 0.0)
+
+
+def _ahead(contact: Contact) -> float:
+    """How far the nearest end of a contact is from its frame's origin along x, m."""
+    ends: Any = [contact.start[0], contact.end[0]] if contact.shape == "capsule" else [contact.start[0]]
+    return float(min(abs(x) for x in ends))
+
+
+def _nearest(rest: Array, places: Array, foot: float, body: float) -> float:
+    """Spacing of anchors at which their feet, and the links of the leg between them, are clear of each other.
+
+    The two pieces that meet at an elbow may touch there; a piece beyond the next frame, s away from the elbow, is
+    spacing * s / link from the other link.
+    """
+    need = 2.0 * max(foot, body)
+    for elbow in range(1, len(places), 2):
+        for side in (-1, 1):
+            between = [abs(x - places[elbow]) for x in rest if (x - places[elbow]) * side > 1e-9 * places[-1]]
+            link = abs(places[elbow + side] - places[elbow])
+            need = max(need, 2.0 * body * link / min(min(between), link))
+    return need * (1.0 + APART)

@@ -1,0 +1,210 @@
+"""How far anchors go in a cycle over level ground: the 60 % rule, the drive that repeats, and the fastest one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array, finite, number
+from bodyplan.errors import InputError, Status
+from bodyplan.gaits.rectilinear.demands import MET, RATE_PLACES, Demands, move_names, phases
+from bodyplan.gaits.rectilinear.moves import Moves
+
+#: the paper's share of a spacing that a drive may take up ("restricted to 60 % ... to avoid adjacent link collision")
+SHARE = 0.6
+#: candidates in each round that closes in on the largest stride, and rounds (17^-13 is below rounding)
+CANDIDATES, ROUNDS = 16, 13
+#: spacings and strides tried for the fastest gait under rate limits, then the golden sections of each
+TRIED, SHARES, GOLDEN = 17, 5, 12
+#: places along a move at which rates are taken in the search
+FEW = 65
+#: shares of straight legs tried where straight ones cannot be lifted or a lift costs stride
+NEARLY_STRAIGHT = (0.995, 0.98, 0.95, 0.9, 0.8)
+
+
+def paper_drive(spacings: ArrayLike, share: float = SHARE) -> Array:
+    """The 60 % rule of the paper for a cycle in which the anchors move one after another: (N,) m from N - 1 spacings.
+
+    Every anchor goes ``share`` of the way to the next one ahead, the head as far as the middle: 720, 1680, 1680 mm from
+    1200 and 2800 (Fig. 8). It does not repeat unless the spacings are equal: L_TM becomes 0.4 L_TM + 0.6 L_MH.
+    """
+    gaps = finite(spacings, "spacings", (None,))
+    if not len(gaps) or np.any(gaps <= 0.0):
+        raise InputError(f"spacings: at least one, all > 0, got {gaps}.")
+    share = number(share, "share", above=0.0, below=1.0)
+    return np.asarray(share * np.append(gaps, gaps[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Stride:
+    """A gait over level ground that repeats: ``spacings`` (N - 1,) m at the beginning of a cycle, ``stride`` m of every
+    anchor, ``moves`` of one cycle, their ``durations`` (M,) s; ``status`` and, where it fails, the move that does."""
+
+    spacings: Array
+    stride: float
+    moves: Moves
+    durations: Array
+    status: Status = Status.OK
+    failing: str = ""
+
+    def speed(self, dwell: float) -> float:
+        """m/s, with ``dwell`` s after every move."""
+        return self.stride / float(self.durations.sum() + dwell * len(self.durations))
+
+
+def cycle_of(spacings: Array, strides: Array, schedule: str, lift: float) -> Moves:
+    """The moves of one cycle over level ground from anchors at ``spacings`` (N - 1,), the first at 0: anchor i goes
+    ``strides`` (N,) m."""
+    count = len(spacings) + 1
+    at = np.zeros((count, 2))
+    at[1:, 0] = np.cumsum(spacings)
+    groups = phases(count, schedule)
+    before, after, lifts = [], [], []
+    for group in groups:
+        before.append(at.copy())
+        at[group, 0] += strides[group]
+        after.append(at.copy())
+        up = np.zeros(count)
+        up[group] = lift
+        lifts.append(up)
+    shape = (len(groups), count)
+    return Moves(np.array(before), np.array(after), np.array(lifts), np.ones(shape), tuple(move_names(count, schedule)))
+
+
+def start_spacings(long: Array, stride: float, schedule: str) -> Array:
+    """(N - 1,) m at the beginning of a cycle: a wave starts with every leg ``long``, two phases with every second one
+    short by the stride."""
+    short = np.zeros(len(long))
+    if schedule == "two-phase":
+        short[1::2] = stride
+    return np.asarray(long - short)
+
+
+def repeating(demands: Demands, long: Array, stride: float, schedule: str, lift: float) -> Moves:
+    """One cycle of equal ``stride`` m in which leg i is ``long[i]`` m at its longest."""
+    return cycle_of(start_spacings(long, stride, schedule), np.full(demands.anchors, stride), schedule, lift)
+
+
+def largest_stride(demands: Demands, long: Array, schedule: str, lift: float, most: float = np.inf) -> float:
+    """The largest stride (m) with legs ``long`` (N - 1,) m at their longest that meets the demands, not above ``most``;
+    0 where none does."""
+    from scipy.optimize import brentq  # half a second to load
+
+    top = min(most, float(np.min(long - demands.least)))
+    if top <= 0.0:
+        return 0.0
+    beyond = cache(lambda stride: _excess(demands, repeating(demands, long, stride, schedule, lift)))
+    if max(beyond(top)) <= MET:
+        return top
+    # reach apart: the excess over it is 0 at a straight leg and tells nothing of how near the edge is
+    low = 1e-6 * top
+    if beyond(low)[0] < 0.0 < beyond(top)[0]:
+        root = float(brentq(lambda stride: beyond(stride)[0], low, top, xtol=1e-16 * top, rtol=1e-15))
+        root *= 1.0 if max(beyond(root)) <= MET else 1.0 - 1e-14
+        if max(beyond(root)) <= MET:
+            return root
+        top = root
+    # a lifted anchor that pulls a straight leg must go forward while it rises: small strides may fail where larger
+    # ones pass, so many are tried at once
+    low, high = 0.0, top
+    for _ in range(ROUNDS):
+        tried = low + (high - low) * np.arange(1, CANDIDATES + 1) / (CANDIDATES + 1)
+        passed = np.array([max(beyond(float(stride))) <= MET for stride in tried])
+        k = int(np.flatnonzero(passed)[-1]) if passed.any() else -1
+        low, high = (float(tried[k]) if k >= 0 else low), (float(tried[k + 1]) if k + 1 < len(tried) else high)
+        if high - low <= 1e-16 * top:
+            break
+    return low
+
+
+def _excess(demands: Demands, moves: Moves) -> tuple[float, float]:
+    """The largest excess over all demands but reach, and over reach."""
+    found = demands.worst(moves)
+    rest = max(float(most.max()) for status, most in found.items() if status != Status.OUT_OF_REACH)
+    return rest, float(found[Status.OUT_OF_REACH].max())
+
+
+def stride_of(
+    demands: Demands, long: Array, stride: float, schedule: str, lift: float, least: float, *, places: int = RATE_PLACES
+) -> Stride:
+    """The gait with that ``stride``, checked and timed; ``least`` s a move, rates taken at ``places`` of each."""
+    moves = repeating(demands, long, stride, schedule, lift)
+    statuses = demands.met(moves)
+    bad = next((i for i, s in enumerate(statuses) if s != Status.OK), None)
+    durations = np.full(len(moves), least) if bad is not None else demands.durations(moves, least, places)
+    return Stride(
+        start_spacings(long, stride, schedule),
+        stride,
+        moves,
+        durations,
+        Status.OK if bad is None else statuses[bad],
+        "" if bad is None else moves.names[bad],
+    )
+
+
+def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least: float, dwell: float) -> Stride | None:
+    """The fastest gait with legs at most ``longest`` (N - 1,) m; None where no stride meets the demands.
+
+    Without rate limits it is the largest stride. With them a straight leg is slow to start, so that spacing and stride
+    are searched: a grid, then golden sections in turn.
+    """
+
+    def at(scale: float, share: float) -> Stride | None:
+        long = longest * scale
+        top = tops.setdefault(scale, largest_stride(demands, long, schedule, lift))
+        if top <= 0.0:
+            return None
+        found = stride_of(demands, long, top * share, schedule, lift, least, places=FEW)
+        return found if found.status == Status.OK else None
+
+    def speed(scale: float, share: float) -> float:
+        return _speed(at(scale, share), dwell)
+
+    tops: dict[float, float] = {}
+    straight = at(1.0, 1.0)
+    if straight is None or np.all(straight.durations <= least):
+        # no joint is too fast: the largest stride, from straight legs unless the lift forbids it
+        found = [straight, *(at(scale, 1.0) for scale in NEARLY_STRAIGHT)]
+        best = max(found, key=lambda f: _speed(f, dwell))
+        if best is None or np.all(best.durations <= least):
+            return best if best is None else replace(best, durations=demands.durations(best.moves, least))
+    scales, shares = np.linspace(1.0, 0.2, TRIED), np.linspace(0.25, 1.0, SHARES)
+    speeds = np.array([[_speed(at(float(x), float(y)), dwell) for y in shares] for x in scales])
+    if not speeds.any():
+        return None
+    i, j = np.unravel_index(int(speeds.argmax()), speeds.shape)
+    scale, share = float(scales[i]), float(shares[j])
+    for width in (1.0, 0.3):
+        near = width * (scales[0] - scales[1])
+        scale = _golden(partial(speed, share=share), max(scale - near, 0.05), min(scale + near, 1.0))
+        near = width * (shares[1] - shares[0])
+        share = _golden(partial(speed, scale), max(share - near, 0.05), min(share + near, 1.0))
+    best = max([at(scale, share), at(float(scales[i]), float(shares[j]))], key=lambda f: _speed(f, dwell))
+    # the search takes rates at few places, the gait at many
+    return None if best is None else replace(best, durations=demands.durations(best.moves, least))
+
+
+def _speed(found: Stride | None, dwell: float) -> float:
+    return 0.0 if found is None else found.speed(dwell)
+
+
+def _golden(f: Callable[[float], float], low: float, high: float) -> float:
+    """Where f is largest in [low, high] by golden sections; the better end where it runs to one."""
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    a, b = low, high
+    c, d = b - ratio * (b - a), a + ratio * (b - a)
+    fc, fd = f(c), f(d)
+    for _ in range(GOLDEN):
+        if fc >= fd:
+            b, d, fd = d, c, fc
+            c = b - ratio * (b - a)
+            fc = f(c)
+        else:
+            a, c, fc = c, d, fd
+            d = a + ratio * (b - a)
+            fd = f(d)
+    return max((low, high, 0.5 * (a + b)), key=f)

@@ -1,0 +1,82 @@
+"""The path of a lifted anchor: a cycloid over the ground, from rest to rest."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray
+
+PATHS = ("cycloid",)
+
+
+class Swing(NamedTuple):
+    """Anchors on their way: displacement from where they rose (``risen``) and from where they land (``landing``), and
+    first and second derivatives by tau, all (..., 2) m along and up."""
+
+    risen: Array
+    landing: Array
+    velocity: Array
+    acceleration: Array
+
+
+def swing(tau: Array, step: Array, lift: Array, early: Array) -> Swing:
+    """Where anchors are at ``tau`` (...,) in [0, 1] of their move, for ``step`` (..., 2) m along and up.
+
+    With u = 3 tau^2 - 2 tau^3 and X(u) = u - sin(2 pi u) / (2 pi) the path is step_x X(u) along and
+    step_z B(u) + ``lift`` sin^2(pi u) up: a cycloid over level ground. B = X(u / ``early``) up to 1 for a step up,
+    which so rises early, and its mirror image for a step down. Near its ends the path goes as tau^6 along and as tau^4
+    up, so that neither an anchor nor a leg that begins straight jumps in rate or acceleration.
+    """
+    tau, lift, early = (np.asarray(v, dtype=np.float64) for v in (tau, lift, early))
+    u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
+    first, second = 6.0 * tau * (1.0 - tau), 6.0 - 12.0 * tau
+    turn = 2.0 * np.pi * u
+    along, left = cycloid(u), cycloid(rest)
+    slope, curve = 1.0 - np.cos(turn), 2.0 * np.pi * np.sin(turn)
+    rise, fall, rise1, rise2 = _climb(u, rest, early, np.asarray(step[..., 1] >= 0.0))
+    hump = np.sin(np.pi * np.minimum(u, rest)) ** 2
+    hump1, hump2 = np.pi * np.sin(turn), 2.0 * np.pi**2 * np.cos(turn)
+    dx, dz = step[..., 0], step[..., 1]
+
+    def by_tau(by_u: Array, by_u2: Array) -> tuple[Array, Array]:
+        return by_u * first, by_u2 * first**2 + by_u * second
+
+    vx, ax = by_tau(dx * slope, dx * curve)
+    vz, az = by_tau(dz * rise1 + lift * hump1, dz * rise2 + lift * hump2)
+    return Swing(
+        np.stack([dx * along, dz * rise + lift * hump], axis=-1),
+        np.stack([-dx * left, lift * hump - dz * fall], axis=-1),
+        np.stack([vx, vz], axis=-1),
+        np.stack([ax, az], axis=-1),
+    )
+
+
+def cycloid(u: Array) -> Array:
+    """X(u) = u - sin(2 pi u) / (2 pi) with full relative precision also where it is small."""
+    v = 2.0 * np.pi * u
+    w = v * v
+    # Taylor series of v - sin v: the last term kept is below 1e-17 of the first for v < 1
+    series = np.ones_like(w)
+    for k in (16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0):
+        series = 1.0 - w / (k * (k + 1.0)) * series
+    small = v * w / 6.0 * series
+    return np.asarray(np.where(v < 1.0, small, v - np.sin(v)) / (2.0 * np.pi))
+
+
+def _smooth(tau: Array) -> Array:
+    return np.asarray(tau * tau * (3.0 - 2.0 * tau))
+
+
+def _climb(u: Array, rest: Array, early: Array, rising: BoolArray) -> tuple[Array, Array, Array, Array]:
+    """B(u), 1 - B(u), and the first two derivatives by u."""
+    before, after = np.minimum(u / early, 1.0), np.minimum(rest / early, 1.0)
+    beyond = np.maximum((early - u) / early, 0.0)  # 1 - before
+    inside = np.maximum((early - rest) / early, 0.0)
+    s = np.where(rising, before, after)
+    turn = 2.0 * np.pi * s
+    sign = np.where(rising, 1.0, -1.0)
+    rise = np.where(rising, cycloid(before), cycloid(inside))
+    fall = np.where(rising, cycloid(beyond), cycloid(after))
+    return rise, fall, (1.0 - np.cos(turn)) / early, sign * 2.0 * np.pi * np.sin(turn) / early**2
