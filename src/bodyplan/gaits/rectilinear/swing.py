@@ -32,12 +32,11 @@ def swing(tau: Array, step: Array, lift: Array, early: Array) -> Swing:
     tau, lift, early = (np.asarray(v, dtype=np.float64) for v in (tau, lift, early))
     u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
     first, second = 6.0 * tau * (1.0 - tau), 6.0 - 12.0 * tau
-    turn = 2.0 * np.pi * u
     along, left = cycloid(u), cycloid(rest)
-    slope, curve = 1.0 - np.cos(turn), 2.0 * np.pi * np.sin(turn)
+    slope, curve = _cycloid_rates(u, rest)
     rise, fall, rise1, rise2 = _climb(u, rest, early, np.asarray(step[..., 1] >= 0.0))
-    hump = np.sin(np.pi * np.minimum(u, rest)) ** 2
-    hump1, hump2 = np.pi * np.sin(turn), 2.0 * np.pi**2 * np.cos(turn)
+    # sin^2(pi u) = X'(u) / 2
+    hump, hump1, hump2 = 0.5 * slope, 0.5 * curve, 2.0 * np.pi**2 * np.cos(2.0 * np.pi * u)
     dx, dz = step[..., 0], step[..., 1]
 
     def by_tau(by_u: Array, by_u2: Array) -> tuple[Array, Array]:
@@ -65,6 +64,13 @@ def cycloid(u: Array) -> Array:
     return np.asarray(np.where(v < 1.0, small, v - np.sin(v)) / (2.0 * np.pi))
 
 
+def _cycloid_rates(u: Array, rest: Array) -> tuple[Array, Array]:
+    """X'(u) = 1 - cos(2 pi u) and X''(u), with full relative precision at both ends; ``rest`` = 1 - u."""
+    near = np.minimum(u, rest)
+    slope = 2.0 * np.sin(np.pi * near) ** 2
+    return np.asarray(slope), np.asarray(np.where(u <= rest, 2.0, -2.0) * np.pi * np.sin(2.0 * np.pi * near))
+
+
 def _smooth(tau: Array) -> Array:
     return np.asarray(tau * tau * (3.0 - 2.0 * tau))
 
@@ -74,9 +80,7 @@ def _climb(u: Array, rest: Array, early: Array, rising: BoolArray) -> tuple[Arra
     before, after = np.minimum(u / early, 1.0), np.minimum(rest / early, 1.0)
     beyond = np.maximum((early - u) / early, 0.0)  # 1 - before
     inside = np.maximum((early - rest) / early, 0.0)
-    s = np.where(rising, before, after)
-    turn = 2.0 * np.pi * s
-    sign = np.where(rising, 1.0, -1.0)
     rise = np.where(rising, cycloid(before), cycloid(inside))
     fall = np.where(rising, cycloid(beyond), cycloid(after))
-    return rise, fall, (1.0 - np.cos(turn)) / early, sign * 2.0 * np.pi * np.sin(turn) / early**2
+    slope, curve = _cycloid_rates(np.where(rising, before, inside), np.where(rising, beyond, after))
+    return rise, fall, slope / early, curve / early**2
