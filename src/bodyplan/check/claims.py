@@ -248,11 +248,15 @@ def supported(motion: Motion, positions: Array, claim: Claim) -> Line:
         return _untested(claim, "the motion does not say which contacts carry load")
     if robot.mass <= 0.0:
         return _untested(claim, f"robot {robot.name!r} has no mass")
-    loaded = motion.contacts > 0.5
+    start, end = (float(claim.data.get(key, limit)) for key, limit in (("start", -np.inf), ("end", np.inf)))
+    inside = np.flatnonzero((t >= start - SAME_TIME) & (t <= end + SAME_TIME))
+    if not len(inside):
+        return _untested(claim, "no sample falls into it")
+    t, loaded = t[inside], motion.contacts[inside] > 0.5
     bare = np.flatnonzero(~loaded.any(axis=1))
     if len(bare):
         return _failed(claim, f"at {t[bare[0]]:.4g} s nothing carries the robot ({len(bare)} samples)")
-    poses = motion.poses()
+    poses = robot.forward(motion.q[inside], motion.base[inside])
     rear, front = np.full(len(t), np.inf), np.full(len(t), -np.inf)
     for contact, carries in zip(robot.contacts, loaded.T, strict=True):
         low, high = footing(contact, poses[contact.frame], along)

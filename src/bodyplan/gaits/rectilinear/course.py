@@ -38,7 +38,7 @@ MOST_CYCLES = 400
 def course_of(gait: Rectilinear, snake: InchingSnake, track: Track, until: float) -> Sequence:
     """The moves of ``gait``, the first anchor at s = the tail's length; those that do not repeat last for ``until`` s
     at least, or as long as they can."""
-    demands = snake.demands(_room(gait, snake, track))
+    demands = snake.demands(room_above(gait, snake, track))
     least = least_time(gait, demands)
     found = stride_on_level(gait, demands, least)
     if track.level:
@@ -74,7 +74,7 @@ def stride_on_level(gait: Rectilinear, demands: Demands, least: float) -> Stride
     return stride_of(demands, long, float(drives[0]), gait.schedule, gait.lift_of(demands), least)
 
 
-def _room(gait: Rectilinear, snake: InchingSnake, track: Track) -> float:
+def room_above(gait: Rectilinear, snake: InchingSnake, track: Track) -> float:
     """Height m of an elbow's axis above the line of the anchors' axes that gait and ground allow."""
     given = np.inf if gait.ceiling is None else gait.ceiling
     return float(min(given, track.ceiling - track.floor - snake.rest - snake.top if track.level else np.inf))

@@ -17,6 +17,7 @@ from bodyplan.gaits.rectilinear.demands import Demands
 from bodyplan.gaits.rectilinear.motion import motion_of
 from bodyplan.gaits.rectilinear.sequence import Sequence
 from bodyplan.gaits.rectilinear.snake import InchingSnake
+from bodyplan.gaits.rectilinear.steered import NOT_STRAIGHT, SteeredCourse, steered_course, steered_motion
 from bodyplan.gaits.rectilinear.strides import SHARE
 from bodyplan.gaits.rectilinear.swing import PATHS
 from bodyplan.gaits.rectilinear.track import Track
@@ -24,12 +25,14 @@ from bodyplan.ground.base import Ground
 from bodyplan.ground.plane import Plane
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
+from bodyplan.units import to_si
 
 DRIVES = ("fastest", "periodic", "paper")
 SCHEDULES = ("wave", "two-phase")
 #: lift where the user names none, of the mean link
 LIFT = 0.1
 MOST_ANCHORS = 101
+MOST_TURNS = 100
 
 
 class Rectilinear(Gait):
@@ -61,7 +64,11 @@ class Rectilinear(Gait):
     limit); a move takes longer where a joint would be too fast. ``dwell`` s of rest after each. ``cycles``: how many,
     then it stands; default: as long as there is time. ``heading`` rad of the way; the tail end starts at ``start``
     (x, y) m. ``joints``: names of the 2 N - 1 pitch joints to use, tail first (anchor, elbow, anchor, ...); default:
-    evenly spread over all, the others stay straight. Yaw joints stay straight.
+    evenly spread over all, the others stay straight.
+
+    ``steer``: pairs (cycle, heading in rad): after so many cycles it turns to that heading, within as many cycles as it
+    takes, on a level floor (ours: the paper goes straight on). Every link needs a yaw joint inside, and legs are at
+    most 0.97 of straight. Yaw joints stay straight where nothing is steered.
 
     Joint rates and accelerations are exact and begin and end every move at 0. Samples from where a drive cannot be made
     on have its status: ``above_ceiling``, ``out_of_reach``, ``limit``, ``below_floor``, ``collapsed``. Raises
@@ -77,7 +84,6 @@ class Rectilinear(Gait):
         "dwell": "time",
         "heading": "angle",
         "start": "length",
-        "drive": "length",
     }
 
     def __init__(
@@ -97,6 +103,7 @@ class Rectilinear(Gait):
         cycles: int | None = None,
         heading: float = 0.0,
         start: Items[float] = (0.0, 0.0),
+        steer: Items[tuple[int, float]] = (),
         joints: Items[str] | None = None,
     ) -> None:
         self.anchors = whole(anchors, "anchors", at_least=3, at_most=MOST_ANCHORS)
@@ -113,7 +120,8 @@ class Rectilinear(Gait):
                 raise InputError(f"drive: the paper's rule moves anchors one after another; got schedule={schedule!r}.")
             self.drive = drive
         else:
-            values = finite(drive, "drive", (self.anchors,))
+            given = [to_si(v, "length", "drive") for v in drive] if isinstance(drive, Items) else drive
+            values = finite(given, "drive", (self.anchors,))
             if np.any(values <= 0.0):
                 raise InputError(f"drive: every drive must be > 0, got {float(values.min())}.")
             self.drive = tuple(float(v) for v in values)
@@ -138,6 +146,9 @@ class Rectilinear(Gait):
         self.heading = number(heading, "heading")
         x, y = finite(start, "start", (2,))
         self.start = (float(x), float(y))
+        self.steer = _turns(steer)
+        if self.steer and self.lift == 0.0:
+            raise InputError("steer: anchors that are not lifted cannot land elsewhere; lift must be > 0.")
         self.joints: tuple[str, ...] | None = None
         if joints is not None:
             if isinstance(joints, str) or not all(isinstance(name, str) for name in joints):
@@ -166,12 +177,14 @@ class Rectilinear(Gait):
             "cycles": self.cycles,
             "heading": self.heading,
             "start": list(self.start),
+            "steer": [list(turn) for turn in self.steer],
             "joints": None if self.joints is None else list(self.joints),
         }
 
     def spacings(self, demands: Demands) -> Array:
         """(N - 1,) m: lengths of the legs (where two phases move: of the long ones) as ``spacing`` says."""
-        return np.asarray(np.array(self.spacing) * demands.straight)
+        most = NOT_STRAIGHT if self.steer else 1.0
+        return np.asarray(np.minimum(self.spacing, most) * demands.straight)
 
     def lift_of(self, demands: Demands) -> float:
         """Lift in m."""
@@ -183,6 +196,8 @@ class Rectilinear(Gait):
 
     def period(self, robot: Robot, ground: Ground | None = None) -> float | None:
         """Time of one cycle on ``ground`` (a level floor where None), s; None where it does not repeat."""
+        if self.steer:
+            return None
         sequence = self.sequence(robot, Plane() if ground is None else ground, 0.0)
         return None if sequence.advance is None or self.cycles is not None else sequence.length
 
@@ -196,6 +211,8 @@ class Rectilinear(Gait):
         from_zero(t)
         snake = InchingSnake.of(robot, self.anchors, self.joints)
         track = Track.of(ground, self.start, self.heading)
+        if self.steer:
+            return steered_motion(self, snake, track, _steered(self, robot, ground, float(t[-1])), t)
         return motion_of(self, snake, track, self.sequence(robot, ground, float(t[-1])), t)
 
 
@@ -203,3 +220,27 @@ class Rectilinear(Gait):
 def _sequence(gait: Rectilinear, robot: Robot, ground: Ground, until: float) -> Sequence:
     snake = InchingSnake.of(robot, gait.anchors, gait.joints)
     return course_of(gait, snake, Track.of(ground, gait.start, gait.heading), until)
+
+
+@lru_cache(maxsize=16)
+def _steered(gait: Rectilinear, robot: Robot, ground: Ground, until: float) -> SteeredCourse:
+    snake = InchingSnake.of(robot, gait.anchors, gait.joints)
+    return steered_course(gait, snake, Track.of(ground, gait.start, gait.heading), until)
+
+
+def _turns(steer: Any) -> tuple[tuple[int, float], ...]:
+    """Pairs (cycle, heading rad) in order, or InputError."""
+    wanted = "steer: expected pairs (cycle, heading), for example [(2, 0.5)]"
+    if isinstance(steer, (str, bytes)) or not isinstance(steer, Items):
+        raise InputError(f"{wanted}, got {steer!r}.")
+    out: list[tuple[int, float]] = []
+    for pair in steer:
+        if isinstance(pair, (str, bytes)) or not isinstance(pair, Items) or len(pair) != 2:
+            raise InputError(f"{wanted}, got {pair!r}.")
+        cycle, heading = whole(pair[0], "steer: cycle"), to_si(pair[1], "angle", "steer: heading")
+        if out and cycle <= out[-1][0]:
+            raise InputError(f"steer: cycles must increase, got {out[-1][0]} and {cycle}.")
+        out.append((cycle, heading))
+    if len(out) > MOST_TURNS:
+        raise InputError(f"steer: at most {MOST_TURNS} turns, got {len(out)}.")
+    return tuple(out)

@@ -51,7 +51,7 @@ def motion_of(gait: Rectilinear, snake: InchingSnake, track: Track, sequence: Se
         status[failed] = sequence.status.value
     standing = _standing(sequence, moment)
     held = holding(snake, poses.array, track.along, anchors[..., 0], standing)
-    contacts, forces = _contacts(snake, standing, held)
+    contacts, forces = carrying(snake, standing, held)
     return Motion(
         robot=robot,
         ground=track.ground,
@@ -84,7 +84,7 @@ def _standing(sequence: Sequence, moment: Moment) -> BoolArray:
     return np.asarray(~(swinging[moment.which] & under_way[:, None]))
 
 
-def _contacts(snake: InchingSnake, standing: BoolArray, held: Holding | None) -> tuple[Array | None, Array | None]:
+def carrying(snake: InchingSnake, standing: BoolArray, held: Holding | None) -> tuple[Array | None, Array | None]:
     """(T, c) 1 where a contact carries, and its force (T, c, 3) N: that of its anchor in equal shares."""
     count = len(snake.robot.contacts)
     if not any(snake.contacts[0::2]):

@@ -55,9 +55,13 @@ class Sequence:
         which = np.clip(np.searchsorted(starts, local, side="right") - 1, 0, size - 1)
         duration = self.durations[which]
         tau = np.clip((local - starts[which]) / duration, 0.0, 1.0)
-        # rounding at a boundary must not leave an anchor a hair above the ground
-        tau = np.where(tau < 1e-13, 0.0, np.where(tau > 1.0 - 1e-13, 1.0, tau))
+        tau = settled(tau)
         return Moment(which, tau, duration, turns, over)
+
+
+def settled(tau: Array) -> Array:
+    """``tau`` with what is rounding at 0 and 1 taken for them: an anchor must not stay a hair above the ground."""
+    return np.asarray(np.where(tau < 1e-13, 0.0, np.where(tau > 1.0 - 1e-13, 1.0, tau)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError, UnknownNameError
-from bodyplan.fitting.mechanism import PITCH, mechanism
+from bodyplan.fitting.mechanism import PITCH, YAW, mechanism
 from bodyplan.gaits.planar import resting_radius
 from bodyplan.gaits.rectilinear.demands import Demands
 from bodyplan.robot.elements import Contact
@@ -110,6 +111,28 @@ class InchingSnake:
             robot.rates[self.columns] * np.abs(self.gain),
             self.nearest,
         )
+
+    def sideways(self) -> tuple[IntArray, Array, Array]:
+        """Yaw joints inside the links, the one nearest to each link's middle: ``columns`` (2 N - 2,) of q, ``gain``
+        (2 N - 2,) rad to the left per unit of q, and how far from the rear end of its link each is, m. InputError where
+        a link has none: such a snake cannot steer."""
+        made = mechanism(self.robot)
+        yaw = made.joints_of(YAW)
+        at = made.places[made.joint_place[yaw]]
+        stations = made.places[made.joint_place[self.columns]]
+        columns, offsets = [], []
+        for start, end in pairwise(stations):
+            inside = np.flatnonzero((at > start + 1e-9 * made.length) & (at < end - 1e-9 * made.length))
+            if not len(inside):
+                raise InputError(
+                    f"Rectilinear: steer needs a yaw joint inside every link between pitch joints; {self.robot.name!r} "
+                    f"has none between {start:.4g} and {end:.4g} m."
+                )
+            k = int(inside[np.argmin(np.abs(at[inside] - 0.5 * (start + end)))])
+            columns.append(yaw[k])
+            offsets.append(at[k] - start)
+        chosen = np.array(columns)
+        return chosen, np.asarray(made.gain[chosen]), np.array(offsets)
 
     def q(self, bends: Array) -> Array:
         """Joint coordinates (..., n) from nose-up angles (..., 2 N - 1), or their derivatives; other joints are 0."""

@@ -19,7 +19,9 @@ SHARE = 0.6
 #: candidates in each round that closes in on the largest stride, and rounds (17^-13 is below rounding)
 CANDIDATES, ROUNDS = 16, 13
 #: spacings and strides tried for the fastest gait under rate limits, then the golden sections of each
-TRIED, SHARES, GOLDEN = 17, 5, 12
+TRIED, SHARES, GOLDEN = 17, 6, 10
+#: a stride so small that time and way are in proportion: without lift the fastest may be the smallest
+LEAST_SHARE = 0.01
 #: places along a move at which rates are taken in the search
 FEW = 65
 #: shares of straight legs tried where straight ones cannot be lifted or a lift costs stride
@@ -150,21 +152,26 @@ def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least:
     """The fastest gait with legs at most ``longest`` (N - 1,) m; None where no stride meets the demands.
 
     Without rate limits it is the largest stride. With them a straight leg is slow to start, so that spacing and stride
-    are searched: a grid, then golden sections in turn.
+    are searched: the best stride of each spacing on a grid and by golden sections, and so the best spacing.
     """
+    top = cache(lambda scale: largest_stride(demands, longest * scale, schedule, lift))
 
+    @cache
     def at(scale: float, share: float) -> Stride | None:
-        long = longest * scale
-        top = tops.setdefault(scale, largest_stride(demands, long, schedule, lift))
-        if top <= 0.0:
+        if top(scale) <= 0.0:
             return None
-        found = stride_of(demands, long, top * share, schedule, lift, least, places=FEW)
+        found = stride_of(demands, longest * scale, top(scale) * share, schedule, lift, least, places=FEW)
         return found if found.status == Status.OK else None
 
     def speed(scale: float, share: float) -> float:
         return _speed(at(scale, share), dwell)
 
-    tops: dict[float, float] = {}
+    shares = np.append(np.linspace(1.0, 0.0, SHARES, endpoint=False), LEAST_SHARE)
+
+    @cache
+    def best_share(scale: float) -> float:
+        return _largest(partial(speed, scale), shares) if top(scale) > 0.0 else 1.0
+
     straight = at(1.0, 1.0)
     if straight is None or np.all(straight.durations <= least):
         # no joint is too fast: the largest stride, from straight legs unless the lift forbids it
@@ -172,18 +179,8 @@ def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least:
         best = max(found, key=lambda f: _speed(f, dwell))
         if best is None or np.all(best.durations <= least):
             return best if best is None else replace(best, durations=demands.durations(best.moves, least))
-    scales, shares = np.linspace(1.0, 0.2, TRIED), np.linspace(0.25, 1.0, SHARES)
-    speeds = np.array([[_speed(at(float(x), float(y)), dwell) for y in shares] for x in scales])
-    if not speeds.any():
-        return None
-    i, j = np.unravel_index(int(speeds.argmax()), speeds.shape)
-    scale, share = float(scales[i]), float(shares[j])
-    for width in (1.0, 0.3):
-        near = width * (scales[0] - scales[1])
-        scale = _golden(partial(speed, share=share), max(scale - near, 0.05), min(scale + near, 1.0))
-        near = width * (shares[1] - shares[0])
-        share = _golden(partial(speed, scale), max(share - near, 0.05), min(share + near, 1.0))
-    best = max([at(scale, share), at(float(scales[i]), float(shares[j]))], key=lambda f: _speed(f, dwell))
+    scale = _largest(lambda scale: speed(scale, best_share(scale)), np.linspace(1.0, 0.2, TRIED))
+    best = at(scale, best_share(scale))
     # the search takes rates at few places, the gait at many
     return None if best is None else replace(best, durations=demands.durations(best.moves, least))
 
@@ -192,19 +189,21 @@ def _speed(found: Stride | None, dwell: float) -> float:
     return 0.0 if found is None else found.speed(dwell)
 
 
-def _golden(f: Callable[[float], float], low: float, high: float) -> float:
-    """Where f is largest in [low, high] by golden sections; the better end where it runs to one."""
+def _largest(f: Callable[[float], float], grid: Array) -> float:
+    """Where f is largest: on a descending ``grid``, then by golden sections between the neighbours of its best."""
+    tried = {float(x): f(float(x)) for x in grid}
+    k = int(np.argmax(list(tried.values())))
     ratio = 0.5 * (np.sqrt(5.0) - 1.0)
-    a, b = low, high
+    a, b = float(grid[min(k + 1, len(grid) - 1)]), float(grid[max(k - 1, 0)])
     c, d = b - ratio * (b - a), a + ratio * (b - a)
-    fc, fd = f(c), f(d)
     for _ in range(GOLDEN):
-        if fc >= fd:
-            b, d, fd = d, c, fc
+        for x in (c, d):
+            if x not in tried:
+                tried[x] = f(x)
+        if tried[c] >= tried[d]:
+            b, d = d, c
             c = b - ratio * (b - a)
-            fc = f(c)
         else:
-            a, c, fc = c, d, fd
+            a, c = c, d
             d = a + ratio * (b - a)
-            fd = f(d)
-    return max((low, high, 0.5 * (a + b)), key=f)
+    return max(tried, key=lambda x: tried[x])
