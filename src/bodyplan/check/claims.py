@@ -252,16 +252,11 @@ def supported(motion: Motion, positions: Array, claim: Claim) -> Line:
     inside = np.flatnonzero((t >= start - SAME_TIME) & (t <= end + SAME_TIME))
     if not len(inside):
         return _untested(claim, "no sample falls into it")
-    t, loaded = t[inside], motion.contacts[inside] > 0.5
-    bare = np.flatnonzero(~loaded.any(axis=1))
+    t = t[inside]
+    rear, centre, front = support_of(motion, along, inside)
+    bare = np.flatnonzero(~np.isfinite(rear))
     if len(bare):
         return _failed(claim, f"at {t[bare[0]]:.4g} s nothing carries the robot ({len(bare)} samples)")
-    poses = robot.forward(motion.q[inside], motion.base[inside])
-    rear, front = np.full(len(t), np.inf), np.full(len(t), -np.inf)
-    for contact, carries in zip(robot.contacts, loaded.T, strict=True):
-        low, high = footing(contact, poses[contact.frame], along)
-        rear, front = np.where(carries, np.minimum(rear, low), rear), np.where(carries, np.maximum(front, high), front)
-    centre = center_from_poses(robot, poses.array) @ along
     margin = np.minimum(centre - rear, front - centre)
     k = int(margin.argmin())
     value = float(margin[k])
@@ -270,6 +265,20 @@ def supported(motion: Motion, positions: Array, claim: Claim) -> Line:
     if value < 0.0:
         detail = f"tips {'forward' if ahead else 'backward'} at {t[k]:.4g} s"
     return Line(claim.label, value, required, "m", value >= required - EXACT, detail, at_least=True, kind=claim.kind)
+
+
+def support_of(motion: Motion, along: Array, samples: Any = slice(None)) -> tuple[Array, Array, Array]:
+    """Rear end of what carries the robot, its centre of mass, and the front end, each (k,) m along a horizontal unit
+    vector (3,) at ``samples`` of the motion; infinite ends where nothing carries. For motions that name their contacts,
+    of robots with mass."""
+    robot = motion.robot
+    poses = robot.forward(motion.q[samples], motion.base[samples])
+    loaded = np.asarray(motion.contacts)[samples] > 0.5
+    rear, front = np.full(len(loaded), np.inf), np.full(len(loaded), -np.inf)
+    for contact, carries in zip(robot.contacts, loaded.T, strict=True):
+        low, high = footing(contact, poses[contact.frame], along)
+        rear, front = np.where(carries, np.minimum(rear, low), rear), np.where(carries, np.maximum(front, high), front)
+    return rear, center_from_poses(robot, poses.array) @ along, front
 
 
 def footing(contact: Contact, pose: Array, along: Array) -> tuple[Array, Array]:
