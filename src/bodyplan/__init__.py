@@ -37,7 +37,21 @@ if TYPE_CHECKING:
     from bodyplan.missions import load_mission
     from bodyplan.motion import Claim, Motion, times
     from bodyplan.plan import plan
-    from bodyplan.robot import Arc, Body, Chain, Contact, Joint, Robot, Row, WheelRadius, acm_l2, snake
+    from bodyplan.robot import (
+        Arc,
+        Body,
+        Chain,
+        Contact,
+        Joint,
+        Robot,
+        Row,
+        WheelRadius,
+        acm_l2,
+        hexapod,
+        silo4,
+        snake,
+        walker,
+    )
     from bodyplan.show import show
     from bodyplan.simulate import Friction, Trial, simulate
 
@@ -60,7 +74,10 @@ _FACE = {
     "Row": "robot",
     "WheelRadius": "robot",
     "acm_l2": "robot",
+    "hexapod": "robot",
+    "silo4": "robot",
     "snake": "robot",
+    "walker": "robot",
     "Corridor": "ground",
     "HeightMap": "ground",
     "Plane": "ground",

@@ -18,6 +18,7 @@ from bodyplan import gaits
 from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
 from bodyplan.robot.library import acm_l2, snake
 from bodyplan.robot.model import Robot
+from bodyplan.robot.walkers import hexapod, silo4, walker
 from bodyplan.units import SI_UNITS, to_si
 
 STRICT = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
@@ -30,6 +31,18 @@ _SNAKE_UNITS = {
     "foot_radius": "length",
     "foot_spread": "length",
     "mass": "mass",
+    "limits": "angle",
+    "rate": "angular_rate",
+    "effort": "torque",
+}
+_LEG_UNITS = {
+    "links": "length",
+    "body": "length",
+    "waist": "length",
+    "splay": "angle",
+    "sole": "length",
+    "mass": "mass",
+    "foot_radius": "length",
     "limits": "angle",
     "rate": "angular_rate",
     "effort": "torque",
@@ -50,6 +63,9 @@ def _robot_table(path: str) -> Robot:
 ROBOTS: dict[str, tuple[Builder, Mapping[str, str]]] = {
     "snake": (snake, _SNAKE_UNITS),
     "acm_l2": (acm_l2, _SNAKE_UNITS),
+    "silo4": (silo4, _LEG_UNITS),
+    "hexapod": (hexapod, _LEG_UNITS),
+    "walker": (walker, _LEG_UNITS),
     "file": (_robot_file, {}),
     "table": (_robot_table, {}),
 }

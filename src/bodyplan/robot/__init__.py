@@ -5,6 +5,7 @@ from bodyplan.robot.library import acm_l2, snake
 from bodyplan.robot.model import Robot
 from bodyplan.robot.poses import Poses
 from bodyplan.robot.reach import Reach
+from bodyplan.robot.walkers import hexapod, silo4, walker
 
 __all__ = [
     "Arc",
@@ -18,5 +19,8 @@ __all__ = [
     "Row",
     "WheelRadius",
     "acm_l2",
+    "hexapod",
+    "silo4",
     "snake",
+    "walker",
 ]

@@ -138,6 +138,13 @@ class Body:
                 checked = finite(value, f"Body.{field}", (size,))
                 object.__setattr__(self, field, tuple(float(x) for x in checked))
 
+    @classmethod
+    def rod(cls, mass: float, length: float, radius: float) -> Body:
+        """A solid cylinder of ``radius`` m along x, from ``length`` m behind the frame's origin up to it."""
+        across = mass * (3.0 * radius**2 + length**2) / 12.0
+        inertia = (0.5 * mass * radius**2, across, across, 0.0, 0.0, 0.0)
+        return cls(mass=mass, com=(-0.5 * length, 0.0, 0.0), inertia=inertia)
+
 
 def _variable(value: Any, field: str) -> Variable:
     if isinstance(value, (Joint, WheelRadius)):

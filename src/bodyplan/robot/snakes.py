@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -81,7 +81,7 @@ def straight(units: Units) -> Parts:
         soles = units.soles(i, frame) if i < len(sizes) else []
         body = Body(mass=mass, com=(-0.5 * length, 0.0, 0.0))
         if soles:  # feet have no mass of their own, and would else count as part of the solid that the link is
-            body = replace(body, inertia=_cylinder(length, mass, units.radius))
+            body = Body.rod(mass, length, units.radius)
         bends = units.bends(i - 1) if i > 1 else {}
         if "pitch" in bends:
             # Rx(-90 deg) lays the turning axis z along +y, Rx(+90 deg) sets the link upright again
@@ -120,12 +120,6 @@ def _halves(rear: float, rear_mass: float, front: float, front_mass: float, radi
     spread = masses @ (sizes**2 / 12.0 + (middles - com) ** 2)
     across = float(0.25 * total * radius**2 + spread)
     return Body(mass=total, com=(com, 0.0, 0.0), inertia=(0.5 * total * radius**2, across, across, 0.0, 0.0, 0.0))
-
-
-def _cylinder(length: float, mass: float, radius: float) -> tuple[float, float, float, float, float, float]:
-    """Inertia of a cylinder along x about its centre."""
-    across = mass * (3.0 * radius**2 + length**2) / 12.0
-    return 0.5 * mass * radius**2, across, across, 0.0, 0.0, 0.0
 
 
 def doubles(units: Units, end_link: float, tips: float = 0.0) -> Parts:
