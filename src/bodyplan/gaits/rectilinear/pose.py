@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, TextArray, finite, frozen, number
 from bodyplan.errors import InputError, SolveError, Status
 from bodyplan.gaits.rectilinear.legs import REACH, leg
-from bodyplan.gaits.rectilinear.transforms import Transform
+from bodyplan.gaits.rectilinear.transforms import Transform, matrices
 from bodyplan.ground.base import Ground
 from bodyplan.ground.profile import Levels, Profile
 
@@ -94,14 +94,15 @@ def pose(
 
     ``floor`` and ``ceiling``: z in m, or steps [(x_start, z), ...], as for :class:`bodyplan.Profile`; ``ground``: a
     ground instead. Every link must keep ``radius`` m away from it along its whole length. ``limits`` (2,) or
-    (2 N - 1, 2) rad: of the joints, the closing one last.
+    (2 N - 1, 2) rad, low and high: of the joints, the closing one last; infinite where there is none.
 
     Statuses, in the order in which they are told: ``not_coplanar``, ``wrong_order``, ``out_of_reach``, ``collapsed``,
     ``limit``, ``links_crossing``, ``below_floor``, ``above_ceiling``. Reach has a relative slack of 1e-12.
 
     Corrections: alpha is signed; the middle joint is psi_L + psi_R - alpha_L + alpha_R and the closing one
     beta_R - alpha_R ((58) and (65) miss the head on stairs); the denominators of (47)-(50), (51), (53), see
-    :mod:`bodyplan.gaits.rectilinear.legs`. Raises InputError for arguments of the wrong shape.
+    :mod:`bodyplan.gaits.rectilinear.legs`. Raises InputError for arguments of the wrong shape, and for transforms that
+    are not rigid.
     """
     points, flat = _points(anchors)
     count = points.shape[-2]
@@ -115,7 +116,7 @@ def pose(
     x, z = np.diff(along, axis=-1), np.diff(points[..., 2], axis=-1)
     a, b = lengths[0::2], lengths[1::2]
     legs = leg(a, b, x, z)
-    angles = np.stack([legs.rear, legs.front], axis=-1).reshape(*points.shape[:-2], -1)
+    angles = np.stack([legs.rear, legs.front], axis=-1).reshape(*points.shape[:-2], len(lengths))
     level = np.zeros((*angles.shape[:-1], 1))
     bends = np.diff(np.concatenate([level, angles, level], axis=-1), axis=-1)
     steps = lengths[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -133,10 +134,7 @@ def pose(
     every[..., 0::2, :], every[..., 1::2, :] = points, elbows
     joint_limits = None
     if limits is not None:
-        given = finite(limits, "limits")
-        if given.shape not in ((2,), (2 * count - 1, 2)):
-            raise InputError(f"limits: expected shape (2,) or ({2 * count - 1}, 2), got {given.shape}.")
-        joint_limits = np.broadcast_to(given, (2 * count - 1, 2))
+        joint_limits = _limits(limits, 2 * count - 1)
     grounds = _grounds(floor, ceiling, ground, every, radius)
     slack = REACH * (a + b) ** 2
     tests = {
@@ -200,7 +198,7 @@ def _points(anchors: ArrayLike | Transform) -> tuple[Array, bool]:
     """Positions (..., N, 3), and whether they were given as x, z."""
     values = anchors.matrix if isinstance(anchors, Transform) else finite(anchors, "anchors")
     if values.ndim >= 3 and values.shape[-2:] == (4, 4):
-        points, flat = values[..., :3, 3], False
+        points, flat = matrices(anchors, "anchors")[..., :3, 3], False
     elif values.ndim >= 2 and values.shape[-1] in (2, 3):
         flat = values.shape[-1] == 2
         points = np.stack([values[..., 0], 0.0 * values[..., 0], values[..., 1]], axis=-1) if flat else values
@@ -228,6 +226,19 @@ def _ahead(points: Array, heading: float | None) -> Array:
 
 def _along(every: Array, ahead: Array) -> Array:
     return np.asarray(np.einsum("...ij,...j->...i", every[..., :2], ahead))
+
+
+def _limits(given: ArrayLike, joints: int) -> Array:
+    """Lowest and highest angles (joints, 2) rad, or InputError."""
+    try:
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"limits: expected numbers, got {given!r}.") from error
+    if values.shape not in ((2,), (joints, 2)):
+        raise InputError(f"limits: expected shape (2,) or ({joints}, 2), got {values.shape}.")
+    if not np.all(values[..., 0] <= values[..., 1]):
+        raise InputError(f"limits: every low must be <= its high, got {given!r}.")
+    return np.broadcast_to(values, (joints, 2))
 
 
 def _beyond(bends: Array, limits: Array | None) -> Any:
@@ -264,13 +275,13 @@ def _grounds(
 
 def _far_below(ceiling: Levels, every: Array, radius: float) -> float:
     """A floor that nothing can touch."""
-    heights = [float(np.nanmin(every[..., 2])), float(np.nanmax(every[..., 2]))]
-    if isinstance(ceiling, (int, float, np.integer, np.floating)):
-        heights.append(float(ceiling))
-    else:
-        with suppress(TypeError, ValueError):  # Profile says what is wrong with it
-            heights += [float(z) for _, z in ceiling if z is not None and np.isfinite(z)]
-    return min(heights) - 10.0 * (max(heights) - min(heights) + radius + 1.0)
+    heights = every[..., 2][np.isfinite(every[..., 2])].tolist()
+    with suppress(TypeError, ValueError):  # Profile says what is wrong with it
+        one = isinstance(ceiling, (int, float, np.integer, np.floating))
+        levels = [ceiling] if one else [z for _, z in ceiling]  # type: ignore[union-attr]
+        heights += [float(z) for z in levels if z is not None and np.isfinite(z)]
+    low, high = min(heights, default=0.0), max(heights, default=0.0)
+    return low - 10.0 * (high - low + radius + 1.0)
 
 
 def _reaches_into(every: Array, ground: Ground, radius: float, scale: float) -> Any:

@@ -18,9 +18,20 @@ RIGID = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Transform:
-    """Homogeneous transforms: ``matrix`` (..., 4, 4), position in m. ``np.asarray`` gives the matrix."""
+    """Homogeneous transforms: ``matrix`` (..., 4, 4), position in m. ``np.asarray`` gives the matrix. Raises InputError
+    for what is not a rigid transform."""
 
     matrix: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", frozen(matrices(self.matrix, "matrix")))
+
+    @classmethod
+    def _made(cls, matrix: Array) -> Transform:
+        """Of a product of rigid transforms, whose rounding adds up."""
+        out = object.__new__(cls)
+        object.__setattr__(out, "matrix", frozen(matrix))
+        return out
 
     @property
     def position(self) -> Array:
@@ -57,13 +68,13 @@ class Transform:
     @property
     def inverse(self) -> Transform:
         """The transform back."""
-        return Transform(frozen(_inverse(self.matrix)))
+        return Transform._made(_inverse(self.matrix))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.array(self.matrix, dtype=dtype) if copy or dtype is not None else self.matrix
 
     def __matmul__(self, other: ArrayLike | Transform) -> Transform:
-        return Transform(frozen(self.matrix @ matrices(other, "transform")))
+        return Transform._made(self.matrix @ matrices(other, "transform"))
 
 
 def relative(
@@ -84,7 +95,7 @@ def relative(
         before = _inverse(matrices(start_drive, "start_drive")) @ before
     if end_drive is not None:
         before = before @ matrices(end_drive, "end_drive")
-    return Transform(frozen(before))
+    return Transform._made(before)
 
 
 def drive(before: ArrayLike | Transform, after: ArrayLike | Transform) -> Transform:
@@ -93,7 +104,7 @@ def drive(before: ArrayLike | Transform, after: ArrayLike | Transform) -> Transf
     Arguments as in :func:`relative`. The printed P_TA^TB = P_MA^MB = P_HA^HB (24) is not meant: Fig. 8 drives the tail
     by 720 mm and the others by 1680 mm.
     """
-    return Transform(frozen(_inverse(matrices(before, "before")) @ matrices(after, "after")))
+    return Transform._made(_inverse(matrices(before, "before")) @ matrices(after, "after"))
 
 
 def matrices(given: ArrayLike | Transform, field: str) -> Array:
