@@ -277,8 +277,8 @@ def _far_below(ceiling: Levels, every: Array, radius: float) -> float:
     """A floor that nothing can touch."""
     heights = every[..., 2][np.isfinite(every[..., 2])].tolist()
     with suppress(TypeError, ValueError):  # Profile says what is wrong with it
-        one = isinstance(ceiling, (int, float, np.integer, np.floating))
-        levels = [ceiling] if one else [z for _, z in ceiling]  # type: ignore[union-attr]
+        steps: Any = ceiling
+        levels = [steps] if isinstance(ceiling, (int, float, np.integer, np.floating)) else [z for _, z in steps]
         heights += [float(z) for z in levels if z is not None and np.isfinite(z)]
     low, high = min(heights, default=0.0), max(heights, default=0.0)
     return low - 10.0 * (high - low + radius + 1.0)
