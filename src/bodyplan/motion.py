@@ -31,7 +31,8 @@ class Claim:
       name in ``bodyplan.curves``, ``parameters`` arrays with one entry a sample, ``unit`` m per curve unit,
       ``pose`` (T, 3) x, y, heading of the curve in the world, ``tolerance`` m.
     * ``periodic``: after ``period`` s the joints repeat and the base is displaced: a point p of it goes to
-      R(``turn``) p + ``advance`` (3,) m; ``turn`` rad about the world's z, or a rotation vector (3,).
+      R(``turn``) p + ``advance`` (3,) m; ``turn`` rad about the world's z, or a rotation vector (3,);
+      ``from_rest``: true where every cycle begins and ends at rest.
     * ``follows``: origins of ``frames`` (F,) stay within ``tolerance`` m of a curve in space: that of
       frame f at sample k lies at arc length ``places`` (T, F) m of ``curve`` (a table for
       :func:`bodyplan.curves.from_dict`), whose frame at s = 0 lies at ``pose`` (7,), or (T, 7).

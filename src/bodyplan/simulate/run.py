@@ -31,6 +31,8 @@ from bodyplan.simulate.trial import Trial
 
 #: most time steps of one run: a mistyped dt should not eat the machine
 MOST_STEPS = 50_000_000
+#: s within which a motion speeds up where nobody says
+RAMP = 1.0
 
 
 def simulate(
@@ -41,7 +43,7 @@ def simulate(
     servo: Servo = None,
     dt: float = 1e-3,
     settle: float = 1.0,
-    ramp: float = 1.0,
+    ramp: float | None = None,
     record_dt: float = 0.02,
     progress: Callable[[float], None] | bool | None = None,
     armature: float = 1e-3,
@@ -54,7 +56,8 @@ def simulate(
     that the plan presses into close in (:mod:`bodyplan.simulate.start`). Then the motion speeds up from
     rest within ``ramp`` s. A motion that claims to be periodic is started half a ramp before its beginning,
     so that the first of ``cycles`` measured cycles begins in phase and at full speed; another motion runs
-    once, ramp included.
+    once, ramp included. Default: 1 s, and none for a periodic motion that says that its cycles begin at rest
+    (half a ramp earlier it would be in the middle of a step).
 
     ``friction`` of the floor: a coefficient, or :class:`Friction` (forward, backward, sideways) for scales;
     None: that of the ground, or else of the contact, or else 0.5. Walls keep their own. ``servo``: (kp, kv)
@@ -79,7 +82,7 @@ def simulate(
         cycles,
         dt=number(dt, "dt", above=0.0),
         settle=number(settle, "settle", at_least=0.0),
-        ramp=number(ramp, "ramp", at_least=0.0),
+        ramp=_ramp(motion) if ramp is None else number(ramp, "ramp", at_least=0.0),
         record_dt=number(record_dt, "record_dt", at_least=dt),
     )
     if timing.steps > MOST_STEPS:
@@ -144,6 +147,12 @@ def simulate(
             "self_collision": self_collision,
         },
     )
+
+
+def _ramp(motion: Motion) -> float:
+    """s within which a motion speeds up where nobody says."""
+    at_rest = any(claim.kind == "periodic" and claim.data.get("from_rest") for claim in motion.claims)
+    return 0.0 if at_rest else RAMP
 
 
 def _remarks_on(motion: Motion) -> list[str]:

@@ -39,7 +39,7 @@ def under_ceilings(robot: Robot, gait: Rectilinear, ceilings: Sequence[float]) -
     snake = InchingSnake.of(robot, gait.anchors, gait.joints)
     rows = []
     for height in heights:
-        demands = snake.demands(float(height))
+        demands = snake.demands(float(height), gait.least_margin)
         stride: dict[str, float | None] = {}
         speed: dict[str, float | None] = {}
         for drive in DRIVES:

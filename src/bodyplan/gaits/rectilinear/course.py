@@ -38,7 +38,7 @@ MOST_CYCLES = 400
 def course_of(gait: Rectilinear, snake: InchingSnake, track: Track, until: float) -> Sequence:
     """The moves of ``gait``, the first anchor at s = the tail's length; those that do not repeat last for ``until`` s
     at least, or as long as they can."""
-    demands = snake.demands(room_above(gait, snake, track))
+    demands = snake.demands(room_above(gait, snake, track), gait.least_margin)
     least = least_time(gait, demands)
     found = stride_on_level(gait, demands, least)
     if track.level:
@@ -216,6 +216,7 @@ def _over_steps(
     most = MOST_CYCLES * size if gait.cycles is None else gait.cycles * size
     pace = local.stride / size
     wanted = int(min(most, np.ceil(until / a_move - 1e-9)))
+    walker = replace(walker, short=np.diff(local.moves.after[..., 0], axis=-1).min(axis=0))
     way = search(walker, start, gait.schedule, wanted, pace)
     if way.status != Status.OK and track.above is not None:
         # a low place: come to it stretched
@@ -240,5 +241,5 @@ def _local(gait: Rectilinear, snake: InchingSnake, track: Track, found: Stride |
         room = min(room, gait.ceiling)
     if not np.isfinite(room):
         return found
-    demands = snake.demands(room)
+    demands = snake.demands(room, gait.least_margin)
     return fastest(demands, gait.spacings(demands), gait.schedule, gait.lift_of(demands), least, gait.dwell)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bodyplan.arrays import Array, IntArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.moves import Moves, State, bends
 
@@ -19,16 +19,33 @@ RATE_PLACES, RATE_SLACK = 1001, 2e-5
 
 
 @dataclass(frozen=True, eq=False)
+class Balance:
+    """Where the centre of mass is along the way: ``weights`` (2 N - 1,) of the joints, tail first, sum 1, and a
+    ``shift`` m by what lies beyond them."""
+
+    weights: Array
+    shift: float
+
+    def center(self, anchors: Array, elbows: Array) -> Array:
+        """(...,) m for anchors (..., N) and elbows (..., N - 1) m along the way."""
+        return np.asarray(anchors @ self.weights[0::2] + elbows @ self.weights[1::2] + self.shift)
+
+
+@dataclass(frozen=True, eq=False)
 class Demands:
-    """``links`` (2 N - 2,) m; ``ceiling`` m above the line of standing anchors for every elbow; ``limits``
-    (2 N - 1, 2) rad and ``rates`` (2 N - 1,) rad/s of the joints, nose-up, closing one last; ``nearest`` m between two
-    neighbouring anchors."""
+    """``links`` (2 N - 2,) m; ``ceiling`` m above the lower anchor of its leg for every elbow; ``limits`` (2 N - 1, 2)
+    rad and ``rates`` (2 N - 1,) rad/s of the joints, nose-up, closing one last; ``nearest`` m between two neighbouring
+    anchors, ``apart`` m between two neighbouring elbows; ``balance`` with the least support ``margin`` m along the way
+    (None: not asked for)."""
 
     links: Array
     ceiling: float = np.inf
     limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
     rates: Array = field(default_factory=lambda: np.zeros(0))
     nearest: float = 0.0
+    apart: float = 0.0
+    balance: Balance | None = None
+    margin: float | None = None
 
     @property
     def anchors(self) -> int:
@@ -50,21 +67,31 @@ class Demands:
         folded = np.where(self.ceiling < np.minimum(a, b), under, np.abs(a - b))
         return np.asarray(np.maximum(folded, self.nearest))
 
-    def excess(self, state: State, level: Array) -> dict[Status, Array]:
+    def excess(self, state: State, swinging: BoolArray) -> dict[Status, Array]:
         """How far a state is beyond every demand, relative to links or as a share of pi, (..., k) a status; not
-        positive where it is met. ``level`` (...,) m: of the standing anchors, from which the ceiling counts."""
+        positive where it is met. ``swinging`` (..., N): the anchors that do not carry."""
         size = float(self.links.max())
         square = self.straight**2
         out = {
             Status.OUT_OF_REACH: -state.legs.short / square,
             Status.COLLAPSED: (np.maximum(self.nearest**2, 1e-12 * square) - _square(state)) / square,
         }
+        elbows = state.elbows(self.links)
         if np.isfinite(self.ceiling):
-            out[Status.ABOVE_CEILING] = (state.elbows(self.links)[..., 1] - level[..., None] - self.ceiling) / size
+            low = np.minimum(state.anchors[..., :-1, 1], state.anchors[..., 1:, 1])
+            out[Status.ABOVE_CEILING] = (elbows[..., 1] - low - self.ceiling) / size
         if len(self.limits):
             q = bends(state.angles)
             beyond = np.concatenate([self.limits[:, 0] - q, q - self.limits[:, 1]], axis=-1) / np.pi
             out[Status.LIMIT] = beyond[..., np.isfinite(self.limits.T.ravel())]
+        if self.apart > 0.0:
+            way = np.diff(elbows, axis=-2)
+            out[Status.LINKS_CROSSING] = (self.apart - np.hypot(way[..., 0], way[..., 1])) / size
+        if self.margin is not None and self.balance is not None:
+            center = self.balance.center(state.anchors[..., 0], elbows[..., 0])
+            rear = np.where(swinging, np.inf, state.anchors[..., 0]).min(axis=-1)
+            front = np.where(swinging, -np.inf, state.anchors[..., 0]).max(axis=-1)
+            out[Status.TIPS_OVER] = (self.margin - np.stack([center - rear, front - center], axis=-1)) / size
         return out
 
     def met(self, moves: Moves) -> list[Status]:
@@ -78,12 +105,12 @@ class Demands:
         count = len(moves)
         tau = np.broadcast_to(np.linspace(0.0, 1.0, COARSE), (count, COARSE))
         which = np.arange(count)
-        level = np.minimum(moves.before[..., 1].min(axis=-1), moves.after[..., 1].min(axis=-1))
+        swinging = moves.swinging[:, None]
         step = 1.0 / (COARSE - 1)
         found: dict[Status, Array] = {}
         for _ in range(ROUNDS + 1):
             state = moves.state(self.links, np.broadcast_to(which[:, None], tau.shape), tau)
-            beyond = self.excess(state, np.broadcast_to(level[:, None], tau.shape))
+            beyond = self.excess(state, swinging)
             places = []
             for status, values in beyond.items():
                 filled = np.where(np.isfinite(values), values, -np.inf)  # a leg out of reach has no elbow

@@ -60,6 +60,10 @@ class Rectilinear(Gait):
     radius. ``clearance`` m that the body keeps from edges of steps and the ceiling above them (default 0.01 of the mean
     link, on ground with steps only).
 
+    ``margin`` m: how far the centre of mass must stay from both ends of what stands, along the way (default: 0, and not
+    asked for with three anchors, which cannot have more: moved one by one their margin is 0 at best). ``ceiling`` and
+    ``margin`` bind all drives.
+
     ``move_time`` s of a move (default: as fast as the joints' rates allow, or 1 s where a pitch joint has no rate
     limit); a move takes longer where a joint would be too fast. ``dwell`` s of rest after each. ``cycles``: how many,
     then it stands; default: as long as there is time. ``heading`` rad of the way; the tail end starts at ``start``
@@ -71,7 +75,8 @@ class Rectilinear(Gait):
     most 0.97 of straight. Yaw joints stay straight where nothing is steered.
 
     Joint rates and accelerations are exact and begin and end every move at 0. Samples from where a drive cannot be made
-    on have its status: ``above_ceiling``, ``out_of_reach``, ``limit``, ``below_floor``, ``collapsed``. Raises
+    on have its status: ``above_ceiling``, ``out_of_reach``, ``limit``, ``below_floor``, ``collapsed``,
+    ``links_crossing``, ``tips_over``. Raises
     InputError for values out of range.
     """
 
@@ -84,6 +89,7 @@ class Rectilinear(Gait):
         "dwell": "time",
         "heading": "angle",
         "start": "length",
+        "margin": "length",
     }
 
     def __init__(
@@ -103,6 +109,7 @@ class Rectilinear(Gait):
         cycles: int | None = None,
         heading: float = 0.0,
         start: Items[float] = (0.0, 0.0),
+        margin: float | None = None,
         steer: Items[tuple[int, float]] = (),
         joints: Items[str] | None = None,
     ) -> None:
@@ -146,6 +153,7 @@ class Rectilinear(Gait):
         self.heading = number(heading, "heading")
         x, y = finite(start, "start", (2,))
         self.start = (float(x), float(y))
+        self.margin = None if margin is None else number(margin, "margin")
         self.steer = _turns(steer)
         if self.steer and self.lift == 0.0:
             raise InputError("steer: anchors that are not lifted cannot land elsewhere; lift must be > 0.")
@@ -177,6 +185,7 @@ class Rectilinear(Gait):
             "cycles": self.cycles,
             "heading": self.heading,
             "start": list(self.start),
+            "margin": self.margin,
             "steer": [list(turn) for turn in self.steer],
             "joints": None if self.joints is None else list(self.joints),
         }
@@ -185,6 +194,11 @@ class Rectilinear(Gait):
         """(N - 1,) m: lengths of the legs (where two phases move: of the long ones) as ``spacing`` says."""
         most = NOT_STRAIGHT if self.steer else 1.0
         return np.asarray(np.minimum(self.spacing, most) * demands.straight)
+
+    @property
+    def least_margin(self) -> float | None:
+        """Support margin m that is asked for; None where there is none."""
+        return (None if self.anchors == 3 else 0.0) if self.margin is None else self.margin
 
     def lift_of(self, demands: Demands) -> float:
         """Lift in m."""

@@ -79,9 +79,8 @@ def _moves(sequence: Sequence) -> bool:
 
 def _standing(sequence: Sequence, moment: Moment) -> BoolArray:
     """(T, N) True for the anchors that carry: all but those that are lifted; at both ends of a move all stand."""
-    swinging = sequence.moves.moving & (sequence.moves.lift > 0.0)
     under_way = (moment.tau > 0.0) & (moment.tau < 1.0)
-    return np.asarray(~(swinging[moment.which] & under_way[:, None]))
+    return np.asarray(~(sequence.moves.swinging[moment.which] & under_way[:, None]))
 
 
 def carrying(snake: InchingSnake, standing: BoolArray, held: Holding | None) -> tuple[Array | None, Array | None]:

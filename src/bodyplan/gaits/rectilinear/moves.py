@@ -32,6 +32,11 @@ class Moves:
         """(M, N) True for the anchors that move."""
         return np.asarray(np.any(self.after != self.before, axis=-1))
 
+    @property
+    def swinging(self) -> BoolArray:
+        """(M, N) True for those that are lifted on their way and carry nothing."""
+        return np.asarray(self.moving & (self.lift > 0.0))
+
     @classmethod
     def joined(cls, parts: Sequence[Moves]) -> Moves:
         """Moves of several tables, in order."""

@@ -15,7 +15,7 @@ from itertools import count
 
 import numpy as np
 
-from bodyplan.arrays import Array, IntArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import MET, Demands, move_names, phases
 from bodyplan.gaits.rectilinear.moves import Moves
@@ -24,8 +24,13 @@ from bodyplan.gaits.rectilinear.track import Track
 
 #: states tried at once, those as good as the best to this many moves, and the most in all
 BATCH, NEAR, MOST_STATES = 16, 0.5, 3000
+#: states tried without coming farther after which there is no way on
+STUCK = 900
 #: what a move counts in units of the pace over level ground: less than 1, so that slow places are gone through
 WEIGHT = 0.05
+#: what a phase counts in which nothing can move: it comes from what stands beside it, which is to be tried otherwise
+#: before all that stands elsewhere
+HELD = 1.0
 #: landing spots tried between standing and reach, and rounds that close in on the farthest good one with a few more
 SPOTS, CLOSER, ROUNDS = 20, 4, 2
 #: where among the spots that go those lie that are offered beside the farthest
@@ -34,7 +39,9 @@ SHARES = (0.8, 0.55, 0.3, 0.0)
 PLACES, CLOSE = 33, 161
 #: shapes of a swing: what is added to its lift, in units of how far the ground on its way stands above its ends, and
 #: how early it rises
-SHAPES = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.35), (1.0, 1.0), (1.0, 0.5), (1.6, 1.0), (1.6, 0.4))
+SHAPES = ((0.0, 1.0), (0.0, 0.7), (0.0, 0.5), (0.0, 0.3), (1.0, 1.0), (1.0, 0.6), (1.6, 1.0), (1.6, 0.4))
+#: shares of a straight leg by which an anchor may be behind the place beyond an edge where the next one lands
+BRIDGES = (0.985, 0.95, 0.9)
 #: share of the mean link within which two stances count as alike
 ALIKE = 0.1
 #: share of it by which one of two alike must be ahead of the other to be tried as well: strides may be small
@@ -45,7 +52,8 @@ STEP = 0.005
 class Walker:
     """A snake on steps: what its moves must keep to. ``lift`` m at least; ``margin`` m that the body keeps from the
     edges of steps and from the ceiling. ``crouch`` m: a snake that is nearer than this to a low place moves as if it
-    were under it with its whole body (None: it may stand tall up to the edge)."""
+    were under it with its whole body (None: it may stand tall up to the edge). ``short`` (N - 1,) m: no leg is made
+    shorter where it need not be, so that the next anchor has room to rise."""
 
     snake: InchingSnake
     track: Track
@@ -53,6 +61,7 @@ class Walker:
     lift: float
     margin: float
     crouch: float | None = None
+    short: Array | None = None
 
     def stand(self, s: Array) -> Array:
         """Anchors (..., N, 2) along and up, standing at s (..., N) m."""
@@ -63,10 +72,9 @@ class Walker:
         count, snake, size = len(moves), self.snake, float(self.snake.links.max())
         tau = np.broadcast_to(places, (count, len(places)))
         state = moves.state(snake.links, np.broadcast_to(np.arange(count)[:, None], tau.shape), tau)
-        lowest = state.anchors[..., 1].min(axis=-1)
         found: dict[Status, Array] = {
             status: np.where(np.isnan(values), -np.inf, values).max(axis=(1, 2), initial=-np.inf)
-            for status, values in self.demands.excess(state, lowest).items()
+            for status, values in self.demands.excess(state, moves.swinging[:, None]).items()
         }
         points = state.points(snake.links)
         known = np.isfinite(points).all(axis=(-2, -1))
@@ -85,7 +93,7 @@ class Walker:
             ceiling[known] = snake.top + self.margin - above.min(axis=1)
         found[Status.BELOW_FLOOR] = floor.max(axis=1) / size
         if self.crouch is not None:
-            high = state.elbows(snake.links)[..., 1].max(axis=-1) - lowest
+            high = state.elbows(snake.links)[..., 1].max(axis=-1) - state.anchors[..., 1].min(axis=-1)
             ceiling = np.maximum(ceiling, high - self._room(moves.before)[:, None])
             ceiling[:, -1] = np.maximum(ceiling[:, -1], high[:, -1] - self._room(moves.after))
         found[Status.ABOVE_CEILING] = np.maximum(found.get(Status.ABOVE_CEILING, -np.inf), ceiling.max(axis=1) / size)
@@ -141,13 +149,14 @@ class Walker:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Anchors (N, 2) before phase ``phase`` of cycle ``cycle``, how they came there (the state before and the move) and
-    in how many moves."""
+    """Anchors (N, 2) before phase ``phase`` of cycle ``cycle``, how they came there (the state before and the move), in
+    how many moves, and how often nothing could move."""
 
     anchors: Array
     phase: int = 0
     cycle: int = 0
     made: int = 0
+    held: int = 0
     before: _State | None = None
     move: Moves | None = None
 
@@ -186,8 +195,8 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
     counter = count()
     best = _State(start)
     heapq.heappush(heaps[0], (0.0, next(counter), best))
-    expanded = 0
-    while expanded < MOST_STATES and any(heaps):
+    expanded, last = 0, 0
+    while expanded < MOST_STATES and expanded - last < STUCK and any(heaps):
         phase = min((k for k, heap in enumerate(heaps) if heap), key=lambda k: heaps[k][0][0])
         first = heaps[phase][0][0]
         batch: list[_State] = []
@@ -197,7 +206,10 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
         if not batch:
             continue
         expanded += len(batch)
-        best = max([best, *batch], key=lambda s: (round(s.far / (1e-6 * link)), -s.made))
+        ahead = max([best, *batch], key=lambda s: (round(s.far / (1e-6 * link)), -s.made))
+        if ahead.far > best.far + STEP * link:
+            last = expanded
+        best = ahead
         done = [s for s in batch if s.made >= most]
         if done:
             return _way(max(done, key=lambda s: s.far), Status.OK, "")
@@ -207,7 +219,9 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
             if state.made < made or state.far > far + STEP * link:
                 seen[stance] = min(made, state.made), max(far, state.far)
                 gone = (state.far - float(start[:, 0].mean())) / pace
-                heapq.heappush(heaps[state.phase], (WEIGHT * state.made - gone, next(counter), state))
+                heapq.heappush(
+                    heaps[state.phase], (WEIGHT * state.made + HELD * state.held - gone, next(counter), state)
+                )
     why = Counter[tuple[str, Status]]()
     for group, name in zip(groups, names, strict=True):
         for i in group:
@@ -246,7 +260,8 @@ def _next(walker: Walker, states: list[_State], group: IntArray, name: str, phas
         mine = [option[k] for option in options]
         then = (state.phase + 1) % phases
         after_that = then, state.cycle + (then == 0)
-        out.append(_State(state.anchors, *after_that, state.made, state, None))
+        stuck = int(not any(mine))
+        out.append(_State(state.anchors, *after_that, state.made, state.held + stuck, state, None))
         for choice in range(max(len(m) for m in mine)):
             after, count = state.anchors.copy(), len(state.anchors)
             lift, early = np.zeros(count), np.ones(count)
@@ -255,7 +270,7 @@ def _next(walker: Walker, states: list[_State], group: IntArray, name: str, phas
                     after[i], lift[i], early[i] = spots[min(choice, len(spots) - 1)]
             move = Moves(state.anchors[None], after[None], lift[None], early[None], (name,))
             if move.moving.any():
-                out.append(_State(after, *after_that, state.made + 1, state, move))
+                out.append(_State(after, *after_that, state.made + 1, state.held, state, move))
     return out
 
 
@@ -275,7 +290,12 @@ def _options(
     if not rows:
         why[name, Status.OUT_OF_REACH] += 1
         return out
-    found = _landings(walker, anchors, i, np.array(rows), np.array(at), name, why)
+    row, spots = np.array(rows), np.array(at)
+    roomy = _roomy(walker, anchors[row], i, spots)
+    found = _landings(walker, anchors, i, row[roomy], spots[roomy], name, why)
+    none = ~roomy & np.array([not found[k] for k in rows])
+    for k, more in enumerate(_landings(walker, anchors, i, row[none], spots[none], name, why)):
+        found[k] += more
     # closer to the farthest that goes than the grid: what is lost here is lost in every cycle
     low = np.array([mine[-1][0][0] if mine else np.nan for mine in found])
     step = (far - here) / SPOTS
@@ -283,7 +303,7 @@ def _options(
         some = np.flatnonzero(np.isfinite(low))
         row = np.repeat(some, CLOSER)
         tried = (low[some, None] + step[some, None] * np.arange(1, CLOSER + 1) / (CLOSER + 1)).ravel()
-        inside = tried < far[row]
+        inside = (tried < far[row]) & _roomy(walker, anchors[row], i, tried)
         if not inside.any():
             break
         for k, more in enumerate(_landings(walker, anchors, i, row[inside], tried[inside], name, Counter())):
@@ -295,6 +315,17 @@ def _options(
             chosen = {len(mine) - 1, *(round(share * (len(mine) - 1)) for share in SHARES)}
             chosen |= {m for m, spot in enumerate(mine) if np.any(np.abs(edges - spot[0][0]) < 1e-12)}
             out[k] = [mine[m] for m in sorted(chosen, reverse=True)]
+    return out
+
+
+def _roomy(walker: Walker, anchors: Array, i: int, at: Array) -> BoolArray:
+    """(K,) True where anchor i at ``at`` (K,) m makes no leg of ``anchors`` (K, N, 2) too short for the next move."""
+    out = np.ones(len(at), dtype=bool)
+    if walker.short is not None:
+        if i > 0:
+            out &= at - anchors[:, i - 1, 0] >= walker.short[i - 1] * (1.0 - 1e-9)
+        if i < anchors.shape[1] - 1:
+            out &= anchors[:, i + 1, 0] - at >= walker.short[i] * (1.0 - 1e-9)
     return out
 
 
@@ -310,13 +341,16 @@ def _reach(walker: Walker, anchors: Array, i: int) -> Array:
 
 
 def _beside_edges(walker: Walker, i: int, count: int) -> Array:
-    """Places next to the edges of steps: feet beside them, tail and head links clear of them."""
+    """Places that matter at the edges of steps: feet beside them, tail and head links clear of them, and those from
+    which the next anchor reaches beyond them."""
     snake, keep = walker.snake, walker.snake.rest + walker.margin
     offsets = [keep, -keep]
     if i == count - 1:
         offsets.append(-snake.head - snake.body - walker.margin)
     if i == 0:
         offsets.append(snake.tail + snake.body + walker.margin)
+    if i < count - 1:
+        offsets += [keep - share * float(walker.demands.straight[i]) for share in BRIDGES]
     return np.unique([edge + offset for edge in walker.track.breaks for offset in offsets])
 
 
@@ -326,6 +360,8 @@ def _landings(
     """The spots ``at`` (K,) m of states ``row`` (K,) on which anchor i can land, with lift and shape, the farthest
     last."""
     out: list[list[tuple[Array, float, float]]] = [[] for _ in anchors]
+    if not len(row):
+        return out
     before = anchors[row]
     after = before.copy()
     after[:, i] = walker.stand(at)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -13,9 +14,11 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.fitting.mechanism import PITCH, YAW, mechanism
 from bodyplan.gaits.planar import resting_radius
-from bodyplan.gaits.rectilinear.demands import Demands
+from bodyplan.gaits.rectilinear.demands import Balance, Demands
 from bodyplan.robot.elements import Contact
+from bodyplan.robot.masses import mass_points
 from bodyplan.robot.model import Robot
+from bodyplan.spatial import rotate
 
 #: share by which feet keep more apart than their radii
 APART = 1e-3
@@ -100,8 +103,9 @@ class InchingSnake:
             _nearest(rest, places, max(radii[0::2], default=0.0), body),
         )
 
-    def demands(self, ceiling: float) -> Demands:
-        """What this snake allows under a ceiling (m above the line of the anchors' axes)."""
+    def demands(self, ceiling: float, margin: float | None = None) -> Demands:
+        """What this snake allows under a ceiling (m above the line of the anchors' axes), with a support margin of at
+        least ``margin`` m (None: not asked for)."""
         robot = self.robot
         low, high = (robot.limits[self.columns, side] * self.gain for side in (0, 1))
         return Demands(
@@ -110,7 +114,28 @@ class InchingSnake:
             np.stack([np.minimum(low, high), np.maximum(low, high)], axis=-1),
             robot.rates[self.columns] * np.abs(self.gain),
             self.nearest,
+            2.0 * self.top * (1.0 + APART),
+            self.balance,
+            margin,
         )
+
+    @cached_property
+    def balance(self) -> Balance | None:
+        """Masses shared out among the joints; None for a robot without."""
+        frames, masses, centres = mass_points(self.robot)
+        if not masses.sum() > 0.0:
+            return None
+        rest = self.robot.forward(np.zeros(self.robot.n)).array[frames]
+        at = rest[:, 0] + rotate(rest[:, 3:], centres)[:, 0]
+        stations = self.tail + np.concatenate([[0.0], np.cumsum(self.links)])
+        inside = np.clip(at, stations[0], stations[-1])
+        k = np.clip(np.searchsorted(stations, inside, side="right") - 1, 0, len(self.links) - 1)
+        part = (inside - stations[k]) / self.links[k]
+        weights = np.zeros(len(stations))
+        np.add.at(weights, k, masses * (1.0 - part))
+        np.add.at(weights, k + 1, masses * part)
+        total = float(masses.sum())
+        return Balance(weights / total, float(masses @ (at - inside)) / total)
 
     def sideways(self) -> tuple[IntArray, Array, Array]:
         """Yaw joints inside the links, the one nearest to each link's middle: ``columns`` (2 N - 2,) of q, ``gain``

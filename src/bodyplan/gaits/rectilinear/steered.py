@@ -64,7 +64,7 @@ def steered_course(gait: Rectilinear, snake: InchingSnake, track: Track, until: 
     if not track.level:
         raise InputError("Rectilinear: steer needs a level floor; this profile has steps.")
     bends = Bends(snake)
-    demands = snake.demands(room_above(gait, snake, track))
+    demands = snake.demands(room_above(gait, snake, track), gait.least_margin)
     least = least_time(gait, demands)
     long = gait.spacings(demands)
     found = stride_on_level(gait, demands, least)

@@ -9,6 +9,8 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray
 
 PATHS = ("cycloid",)
+#: how long a step up that rises early waits before it goes along, as a share of what it is early by
+WAIT = 0.6
 
 
 class Swing(NamedTuple):
@@ -25,18 +27,20 @@ def swing(tau: Array, step: Array, lift: Array, early: Array) -> Swing:
     """Where anchors are at ``tau`` (...,) in [0, 1] of their move, for ``step`` (..., 2) m along and up.
 
     With u = 3 tau^2 - 2 tau^3 and X(u) = u - sin(2 pi u) / (2 pi) the path is step_x X(u) along and
-    step_z B(u) + ``lift`` sin^2(pi u) up: a cycloid over level ground. B = X(u / ``early``) up to 1 for a step up,
-    which so rises early, and its mirror image for a step down. Near its ends the path goes as tau^6 along and as tau^4
-    up, so that neither an anchor nor a leg that begins straight jumps in rate or acceleration.
+    step_z B(u) + ``lift`` sin^2(pi u) up: a cycloid over level ground. With ``early`` < 1 a step up rises within that
+    share of u and goes along in what is left of it, B = X(u / early) up to 1 and X((u - w) / (1 - w)) from w on, with
+    w = WAIT (1 - early); a step down is its mirror image. Near its ends the path goes as tau^6 along and as tau^4 up,
+    so that neither an anchor nor a leg that begins straight jumps in rate or acceleration.
     """
     tau, lift, early = (np.asarray(v, dtype=np.float64) for v in (tau, lift, early))
     u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
     first, second = 6.0 * tau * (1.0 - tau), 6.0 - 12.0 * tau
-    along, left = cycloid(u), cycloid(rest)
-    slope, curve = _cycloid_rates(u, rest)
-    rise, fall, rise1, rise2 = _climb(u, rest, early, np.asarray(step[..., 1] >= 0.0))
+    rising = np.asarray(step[..., 1] >= 0.0)
+    rise, fall, rise1, rise2 = _part(u, rest, early, rising)
+    along, left, slope, curve = _part(u, rest, 1.0 - WAIT * (1.0 - early), ~rising)
     # sin^2(pi u) = X'(u) / 2
-    hump, hump1, hump2 = 0.5 * slope, 0.5 * curve, 2.0 * np.pi**2 * np.cos(2.0 * np.pi * u)
+    hump, hump1 = (0.5 * rate for rate in _cycloid_rates(u, rest))
+    hump2 = 2.0 * np.pi**2 * np.cos(2.0 * np.pi * u)
     dx, dz = step[..., 0], step[..., 1]
 
     def by_tau(by_u: Array, by_u2: Array) -> tuple[Array, Array]:
@@ -75,12 +79,13 @@ def _smooth(tau: Array) -> Array:
     return np.asarray(tau * tau * (3.0 - 2.0 * tau))
 
 
-def _climb(u: Array, rest: Array, early: Array, rising: BoolArray) -> tuple[Array, Array, Array, Array]:
-    """B(u), 1 - B(u), and the first two derivatives by u."""
-    before, after = np.minimum(u / early, 1.0), np.minimum(rest / early, 1.0)
-    beyond = np.maximum((early - u) / early, 0.0)  # 1 - before
-    inside = np.maximum((early - rest) / early, 0.0)
-    rise = np.where(rising, cycloid(before), cycloid(inside))
-    fall = np.where(rising, cycloid(beyond), cycloid(after))
-    slope, curve = _cycloid_rates(np.where(rising, before, inside), np.where(rising, beyond, after))
-    return rise, fall, slope / early, curve / early**2
+def _part(u: Array, rest: Array, share: Array, first: BoolArray) -> tuple[Array, Array, Array, Array]:
+    """A cycloid within the ``first`` (or else the last) ``share`` of u, 1 less it, and its first two derivatives by
+    u."""
+    before, after = np.minimum(u / share, 1.0), np.minimum(rest / share, 1.0)
+    beyond = np.maximum((share - u) / share, 0.0)  # 1 - before
+    inside = np.maximum((share - rest) / share, 0.0)
+    done = np.where(first, cycloid(before), cycloid(inside))
+    left = np.where(first, cycloid(beyond), cycloid(after))
+    slope, curve = _cycloid_rates(np.where(first, before, inside), np.where(first, beyond, after))
+    return done, left, slope / share, curve / share**2
