@@ -1,6 +1,6 @@
 """What physics makes of inching: bars measured beforehand, and controls.
 
-Links of 200 mm between pitch joints (two modules of 100 mm and 125 g), paired ball feet of 3 mm at +-60 mm, moves of 1 s.
+Links of 200 mm between pitch joints (two modules of 100 mm and 125 g), paired ball feet of 3 mm at +-60 mm, 1 s a move.
 """
 
 import numpy as np

@@ -176,7 +176,11 @@ def _middle(bends: Bends, stance: Stance, i: int, chord: float) -> tuple[Array, 
     y = made.turns[:, 3, :, 1]
     after = x[:, 4:].copy()
     after[:, 0] += rise_of(made.turns[:, 3])
-    return made.ends[:, 3, :2], np.arctan2(-y[:, 0], y[:, 1]), {i - 1: x[:, :4], i: after}, good
+    # counted on from the heading before: angles do not stop at pi
+    before = stance.heading[:, i]
+    way = before + np.arctan2(-y[:, 0] * np.cos(before) - y[:, 1] * np.sin(before),
+                              y[:, 1] * np.cos(before) - y[:, 0] * np.sin(before))  # fmt: skip
+    return made.ends[:, 3, :2], way, {i - 1: x[:, :4], i: after}, good
 
 
 def closure(made: Chain, k: int, target: Array, wanted: Array) -> tuple[Array, Array]:
