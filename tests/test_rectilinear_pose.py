@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import bodyplan as bp
 from bodyplan.gaits.rectilinear import Transform, pose
-from inching_cases import anchors_of, chain, joints_by_hand
+from rectilinear_cases import anchors_of, chain, joints_by_hand
 
 #: deg: angles 1 to 4 as printed, for anchors in mm after the tail's, the middle's and the head's move
 PRINTED = {

@@ -1,0 +1,81 @@
+"""References for tests of inching: forward kinematics, swing and legs written down once more, in plain formulas."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+
+import bodyplan as bp
+
+#: Figs. 8 and 11 of the paper: 1000 mm modules, two of them between pitch joints
+MODULES = {"axes": "alternating", "first": "pitch", "radius": 1e-3, "mass": 1.0}
+
+
+def paper_snake() -> bp.Robot:
+    return bp.snake(10, 1.0, **MODULES)
+
+
+def chain(start: Any, joints: Any, links: Any) -> np.ndarray:
+    """Joints' places (..., p, 2) along and up of links in a row: every nose-up joint turns all that is ahead of it."""
+    joints, links = np.asarray(joints), np.asarray(links)
+    at = np.array(np.broadcast_to(start, (*joints.shape[:-1], 2)), dtype=np.float64)
+    places, angle = [at], np.zeros(joints.shape[:-1])
+    for k, length in enumerate(links):
+        angle = angle + joints[..., k]
+        at = at + length * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        places.append(at)
+    return np.stack(places, axis=-2)
+
+
+def anchors_of(spans: Any, rises: Any, start: Any = (0.0, 0.0)) -> np.ndarray:
+    """Anchors (N, 2) along and up from the horizontal and vertical steps between them."""
+    steps = np.stack([np.asarray(spans, float), np.asarray(rises, float)], axis=-1)
+    return np.asarray(start) + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
+
+def smooth(tau: Any) -> Any:
+    return 3 * tau**2 - 2 * tau**3
+
+
+def swing_by_hand(tau: Any, step: Any, lift: Any, early: Any) -> tuple[Any, Any]:
+    """Displacement along and up of a swing in mpmath: the formulas of its docstring, nothing rearranged."""
+    u = smooth(tau)
+    dx, dz = step
+
+    def cycloid(v: Any) -> Any:
+        return v - mp.sin(2 * mp.pi * v) / (2 * mp.pi)
+
+    climb = cycloid(min(u / early, mp.mpf(1))) if dz >= 0 else 1 - cycloid(min((1 - u) / early, mp.mpf(1)))
+    return dx * cycloid(u), dz * climb + lift * mp.sin(mp.pi * u) ** 2
+
+
+def angles_by_hand(anchors: list[tuple[Any, Any]], links: Any) -> list[Any]:
+    """Absolute angles of the links by the law of cosines, in mpmath."""
+    out = []
+    for i, ((x0, z0), (x1, z1)) in enumerate(pairwise(anchors)):
+        a, b = mp.mpf(float(links[2 * i])), mp.mpf(float(links[2 * i + 1]))
+        x, z = x1 - x0, z1 - z0
+        length = mp.sqrt(x * x + z * z)
+        alpha = mp.atan2(z, x)
+        beta = mp.acos(min((a * a + length**2 - b * b) / (2 * a * length), mp.mpf(1)))
+        psi = mp.acos(min((b * b + length**2 - a * a) / (2 * b * length), mp.mpf(1)))
+        out += [alpha + beta, alpha - psi]
+    return out
+
+
+def joints_by_hand(anchors: Any, links: Any) -> np.ndarray:
+    """Nose-up joints (..., 2 N - 1) from anchors (..., N, 2) by the law of cosines; NaN out of reach."""
+    anchors, links = np.asarray(anchors, float), np.asarray(links, float)
+    a, b = links[0::2], links[1::2]
+    x, z = np.moveaxis(np.diff(anchors, axis=-2), -1, 0)
+    square = x * x + z * z
+    length = np.sqrt(square)
+    with np.errstate(invalid="ignore"):
+        rear = np.arctan2(z, x) + np.arccos((a * a + square - b * b) / (2 * a * length))
+        front = np.arctan2(z, x) - np.arccos((b * b + square - a * a) / (2 * b * length))
+    angles = np.stack([rear, front], axis=-1).reshape(*x.shape[:-1], -1)
+    level = np.zeros((*angles.shape[:-1], 1))
+    return np.diff(np.concatenate([level, angles, level], axis=-1), axis=-1)
