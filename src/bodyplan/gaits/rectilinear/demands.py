@@ -9,6 +9,7 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.moves import Moves, State, bends
+from bodyplan.gaits.rectilinear.parts import Parts
 
 #: places along a move that are tried at first, and in each of the rounds that close in on the worst of them
 COARSE, FINE, ROUNDS = 65, 17, 3
@@ -35,15 +36,17 @@ class Balance:
 class Demands:
     """``links`` (2 N - 2,) m; ``ceiling`` m above the lower anchor of its leg for every elbow; ``limits`` (2 N - 1, 2)
     rad and ``rates`` (2 N - 1,) rad/s of the joints, nose-up, closing one last; ``nearest`` m between two neighbouring
-    anchors, ``apart`` m between two neighbouring elbows; ``balance`` with the least support ``margin`` m along the way
-    (None: not asked for)."""
+    anchors; ``parts`` that must be clear of each other behind and ahead of joints, the first of them ``tail`` m from
+    the tail end (None: they are thin); ``balance`` with the least support ``margin`` m along the way (None: not asked
+    for)."""
 
     links: Array
     ceiling: float = np.inf
     limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
     rates: Array = field(default_factory=lambda: np.zeros(0))
     nearest: float = 0.0
-    apart: float = 0.0
+    parts: Parts | None = None
+    tail: float = 0.0
     balance: Balance | None = None
     margin: float | None = None
 
@@ -71,10 +74,10 @@ class Demands:
         """How far a state is beyond every demand, relative to links or as a share of pi, (..., k) a status; not
         positive where it is met. ``swinging`` (..., N): the anchors that do not carry."""
         size = float(self.links.max())
-        square = self.straight**2
+        square, folded = self.straight**2, (self.links[0::2] - self.links[1::2]) ** 2
         out = {
             Status.OUT_OF_REACH: -state.legs.short / square,
-            Status.COLLAPSED: (np.maximum(self.nearest**2, 1e-12 * square) - _square(state)) / square,
+            Status.COLLAPSED: (np.maximum(self.nearest**2, folded + 1e-12 * square) - _square(state)) / square,
         }
         elbows = state.elbows(self.links)
         if np.isfinite(self.ceiling):
@@ -84,9 +87,10 @@ class Demands:
             q = bends(state.angles)
             beyond = np.concatenate([self.limits[:, 0] - q, q - self.limits[:, 1]], axis=-1) / np.pi
             out[Status.LIMIT] = beyond[..., np.isfinite(self.limits.T.ravel())]
-        if self.apart > 0.0:
-            way = np.diff(elbows, axis=-2)
-            out[Status.LINKS_CROSSING] = (self.apart - np.hypot(way[..., 0], way[..., 1])) / size
+        if self.parts is not None:
+            into = self.parts.overlaps(state.points(self.links), state.angles, self.tail) / size
+            out[Status.COLLAPSED] = np.concatenate([out[Status.COLLAPSED], into[..., :1]], axis=-1)
+            out[Status.LINKS_CROSSING] = into[..., 1:]
         if self.margin is not None and self.balance is not None:
             center = self.balance.center(state.anchors[..., 0], elbows[..., 0])
             rear = np.where(swinging, np.inf, state.anchors[..., 0]).min(axis=-1)

@@ -15,12 +15,13 @@ from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.fitting.mechanism import PITCH, YAW, mechanism
 from bodyplan.gaits.planar import resting_radius
 from bodyplan.gaits.rectilinear.demands import Balance, Demands
+from bodyplan.gaits.rectilinear.parts import Parts
 from bodyplan.robot.elements import Contact
 from bodyplan.robot.masses import mass_points
 from bodyplan.robot.model import Robot
 from bodyplan.spatial import rotate
 
-#: share by which feet keep more apart than their radii
+#: share by which feet and links keep more apart than their radii
 APART = 1e-3
 
 
@@ -31,8 +32,8 @@ class InchingSnake:
     ``columns`` (2 N - 1,) of q; ``gain`` (2 N - 1,): nose-up angle per unit of q. ``links`` (2 N - 2,), ``tail`` and
     ``head`` m: lengths between them and beyond. ``frames`` (2 N - 1,) names of frames at the joints. ``contacts``:
     indices among ``robot.contacts`` of those at each joint. ``rest`` m: height of an anchor's axis above the floor;
-    ``top`` m: radius of the body at an elbow; ``body`` m: largest radius of the links. ``nearest`` m: smallest spacing
-    at which feet and links of a leg are clear of each other.
+    ``top`` m: radius of the body at an elbow; ``body`` m: largest radius of the links. ``nearest`` m: spacing
+    below which feet or links of a leg are not clear of each other (above it, too, they may not be: see ``parts``).
     """
 
     robot: Robot
@@ -114,10 +115,21 @@ class InchingSnake:
             np.stack([np.minimum(low, high), np.maximum(low, high)], axis=-1),
             robot.rates[self.columns] * np.abs(self.gain),
             self.nearest,
-            2.0 * self.top * (1.0 + APART),
+            self.parts,
+            self.tail,
             self.balance,
             margin,
         )
+
+    @cached_property
+    def parts(self) -> Parts | None:
+        """Capsules and feet that must be clear of each other."""
+        return Parts.of(self.robot, self.columns, self.stations, APART)
+
+    @property
+    def stations(self) -> Array:
+        """(2 N - 1,) m: the joints' places from the tail end."""
+        return np.asarray(self.tail + np.concatenate([[0.0], np.cumsum(self.links)]))
 
     @cached_property
     def balance(self) -> Balance | None:
@@ -127,7 +139,7 @@ class InchingSnake:
             return None
         rest = self.robot.forward(np.zeros(self.robot.n)).array[frames]
         at = rest[:, 0] + rotate(rest[:, 3:], centres)[:, 0]
-        stations = self.tail + np.concatenate([[0.0], np.cumsum(self.links)])
+        stations = self.stations
         inside = np.clip(at, stations[0], stations[-1])
         k = np.clip(np.searchsorted(stations, inside, side="right") - 1, 0, len(self.links) - 1)
         part = (inside - stations[k]) / self.links[k]
@@ -180,10 +192,10 @@ def _ahead(contact: Contact) -> float:
 
 
 def _nearest(rest: Array, places: Array, foot: float, body: float) -> float:
-    """Spacing of anchors at which their feet, and the links of the leg between them, are clear of each other.
+    """Spacing of anchors below which their feet, or the links of the leg between them, are not clear of each other.
 
     The two pieces that meet at an elbow may touch there; a piece beyond the next frame, s away from the elbow, is
-    spacing * s / link from the other link.
+    spacing * s / link * cos(half the angle there) from the other link, where the links are equal.
     """
     need = 2.0 * max(foot, body)
     for elbow in range(1, len(places), 2):

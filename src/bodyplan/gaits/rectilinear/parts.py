@@ -1,0 +1,129 @@
+"""How far the parts of a body that bends in an upright plane keep from each other: a Numba kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.robot.model import Robot
+from bodyplan.robot.neighbours import separate_contacts
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """P capsules and balls on the links of a snake, tail first.
+
+    ``link`` (P,): 0 the tail link, 1 to 2 N - 2 those between pitch joints, then the head link. ``ends`` (P, 2, 2) m in
+    the frame of the link, from its rear joint along and up. ``need`` (P, P) m: how far two of them must be apart in the
+    plane; 0 for those that are always clear of each other or may touch. ``leg`` (P, P): both are on one leg.
+    """
+
+    link: IntArray
+    ends: Array
+    need: Array
+    leg: BoolArray
+
+    @classmethod
+    def of(cls, robot: Robot, columns: IntArray, stations: Array, share: float) -> Parts | None:
+        """The contacts of ``robot`` on the links that the joints ``columns`` (2 N - 1,) at ``stations`` (2 N - 1,) m
+        bend, to be kept apart by ``share`` more than their radii. None where all of them may touch."""
+        rest = robot.forward(np.zeros(robot.n))
+        bent = np.zeros((len(columns), robot.n))
+        bent[np.arange(len(columns)), columns] = 0.1
+        turned = np.abs(robot.forward(bent).quaternions - rest.quaternions).max(axis=-1) > 1e-6
+        behind = np.concatenate([[0.0], stations])
+        some = [k for k, c in enumerate(robot.contacts) if c.shape in ("capsule", "sphere")]
+        frames = np.array([robot.frame_index(robot.contacts[k].frame) for k in some], dtype=np.int64)
+        link = turned.sum(axis=0)[frames]
+        order = np.argsort(link, kind="stable")
+        place = {some[k]: p for p, k in enumerate(order)}
+        ends, across, radius = np.zeros((len(some), 2, 2)), np.zeros(len(some)), np.zeros(len(some))
+        for p, k in enumerate(order):
+            contact, frame = robot.contacts[some[k]], frames[k]
+            shape = contact.start if contact.shape == "sphere" else contact.end
+            points = np.array([contact.start, shape]) @ rest.rotations[frame].T + rest.positions[frame]
+            ends[p] = points[:, [0, 2]] - [behind[link[k]], 0.0]
+            across[p], radius[p] = points[:, 1].mean(), contact.radius
+        need = np.zeros((len(some), len(some)))
+        for a, b in separate_contacts(robot):
+            if a in place and b in place:
+                i, j = sorted((place[a], place[b]))
+                apart = (1.0 + share) * (radius[i] + radius[j])
+                need[i, j] = np.sqrt(max(apart**2 - (across[i] - across[j]) ** 2, 0.0))
+        links = link[order]
+        need[links[:, None] == links] = 0.0
+        if not need.any():
+            return None
+        number = np.where((links > 0) & (links < len(columns)), (links - 1) // 2, -1 - links)
+        return cls(links, ends, need, np.asarray(number[:, None] == number))
+
+    def overlaps(self, points: Array, angles: Array, tail: float) -> Array:
+        """(..., 2) m: by how much two parts of one leg, and two parts of different legs, are nearer to each other than
+        they must be; negative where all are clear, but not below minus the largest ``need``; minus infinity where the
+        pose is not known. ``points`` (..., 2 N - 1, 2) m of the joints, ``angles`` (..., 2 N - 2) rad of the links,
+        ``tail`` m."""
+        shape = points.shape[:-2]
+        level = np.zeros((*shape, 1))
+        origins = np.concatenate([points[..., :1, :] - [tail, 0.0], points], axis=-2).reshape(
+            -1, points.shape[-2] + 1, 2
+        )
+        turns = np.concatenate([level, angles, level], axis=-1).reshape(len(origins), -1)
+        out = np.full((len(origins), 2), -np.inf)
+        known = np.flatnonzero(np.isfinite(origins).all(axis=(1, 2)))
+        _overlaps(origins, turns, known, self.link, self.ends, self.need, self.leg, out)
+        return out.reshape(*shape, 2)
+
+
+@njit(cache=True)
+def _overlaps(
+    origins: Array, turns: Array, known: IntArray, link: IntArray, ends: Array, need: Array, leg: BoolArray, out: Array
+) -> None:
+    """Largest need - distance of two parts, into ``out`` (S, 2), of the states ``known``."""
+    count = len(link)
+    at, low, high, ahead = np.empty((count, 4)), np.empty(count), np.empty(count), np.empty(count)
+    most = need.max()
+    for s in known:
+        out[s] = -most
+        for p in range(count):
+            cos, sin = np.cos(turns[s, link[p]]), np.sin(turns[s, link[p]])
+            for e in range(2):
+                x, z = ends[p, e]
+                at[p, 2 * e] = origins[s, link[p], 0] + cos * x - sin * z
+                at[p, 2 * e + 1] = origins[s, link[p], 1] + sin * x + cos * z
+            low[p], high[p] = min(at[p, 0], at[p, 2]), max(at[p, 0], at[p, 2])
+        ahead[count - 1] = low[count - 1]
+        for p in range(count - 2, -1, -1):
+            ahead[p] = min(low[p], ahead[p + 1])
+        for i in range(count):
+            for j in range(i + 1, count):
+                if most - (ahead[j] - high[i]) <= min(out[s, 0], out[s, 1]):
+                    break
+                side = 0 if leg[i, j] else 1
+                if need[i, j] > 0.0 and need[i, j] - max(low[j] - high[i], low[i] - high[j]) > out[s, side]:
+                    out[s, side] = max(out[s, side], need[i, j] - _distance(at[i], at[j]))
+
+
+@njit(cache=True)
+def _distance(p: Array, q: Array) -> float:
+    """Of two segments (4,): x and z of both ends."""
+    a, b, c, d = _side(p, q[0], q[1]), _side(p, q[2], q[3]), _side(q, p[0], p[1]), _side(q, p[2], p[3])
+    if ((a > 0.0 > b) or (a < 0.0 < b)) and ((c > 0.0 > d) or (c < 0.0 < d)):
+        return 0.0
+    return min(_to(p, q[0], q[1]), _to(p, q[2], q[3]), _to(q, p[0], p[1]), _to(q, p[2], p[3]))
+
+
+@njit(cache=True)
+def _side(p: Array, x: float, z: float) -> float:
+    return float((p[2] - p[0]) * (z - p[1]) - (p[3] - p[1]) * (x - p[0]))
+
+
+@njit(cache=True)
+def _to(p: Array, x: float, z: float) -> float:
+    """Distance of a point from a segment."""
+    ux, uz, vx, vz = p[2] - p[0], p[3] - p[1], x - p[0], z - p[1]
+    square = ux * ux + uz * uz
+    share = min(max((ux * vx + uz * vz) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return float(np.hypot(vx - share * ux, vz - share * uz))
