@@ -18,6 +18,8 @@ from bodyplan.gaits.rectilinear.moves import Moves
 SHARE = 0.6
 #: candidates in each round that closes in on the largest stride, and rounds (17^-13 is below rounding)
 CANDIDATES, ROUNDS = 16, 13
+#: share of the largest stride that spacings allow below which no stride is looked for
+SMALLEST = 1e-4
 #: spacings and strides tried for the fastest gait under rate limits, then the golden sections of each
 TRIED, SHARES, GOLDEN = 17, 6, 10
 #: a stride so small that time and way are in proportion: without lift the fastest may be the smallest
@@ -99,15 +101,23 @@ def largest_stride(demands: Demands, long: Array, schedule: str, lift: float, mo
     top = min(most, float(np.min(long - demands.least)))
     if top <= 0.0:
         return 0.0
-    beyond = cache(lambda stride: _excess(demands, repeating(demands, long, stride, schedule, lift)))
-    if max(beyond(top)) <= MET:
+    known: dict[float, Array] = {}
+
+    def beyond(*strides: float) -> Array:
+        new = [stride for stride in strides if stride not in known]
+        if new:
+            cycles = [repeating(demands, long, stride, schedule, lift) for stride in new]
+            known.update(zip(new, _excess(demands, cycles), strict=True))
+        return np.array([known[stride] for stride in strides])
+
+    if beyond(top).max() <= MET:
         return top
     # reach apart: the excess over it is 0 at a straight leg and tells nothing of how near the edge is
     low = 1e-6 * top
-    if beyond(low)[0] < 0.0 < beyond(top)[0]:
-        root = float(brentq(lambda stride: beyond(stride)[0], low, top, xtol=1e-16 * top, rtol=1e-15))
-        root *= 1.0 if max(beyond(root)) <= MET else 1.0 - 1e-14
-        if max(beyond(root)) <= MET:
+    if beyond(low)[0, 0] < 0.0 < beyond(top)[0, 0]:
+        root = float(brentq(lambda stride: beyond(stride)[0, 0], low, top, xtol=1e-16 * top, rtol=1e-15))
+        root *= 1.0 if beyond(root).max() <= MET else 1.0 - 1e-14
+        if beyond(root).max() <= MET:
             return root
         top = root
     # a lifted anchor that pulls a straight leg must go forward while it rises: small strides may fail where larger
@@ -115,19 +125,22 @@ def largest_stride(demands: Demands, long: Array, schedule: str, lift: float, mo
     low, high = 0.0, top
     for _ in range(ROUNDS):
         tried = low + (high - low) * np.arange(1, CANDIDATES + 1) / (CANDIDATES + 1)
-        passed = np.array([max(beyond(float(stride))) <= MET for stride in tried])
+        passed = beyond(*map(float, tried)).max(axis=1) <= MET
         k = int(np.flatnonzero(passed)[-1]) if passed.any() else -1
         low, high = (float(tried[k]) if k >= 0 else low), (float(tried[k + 1]) if k + 1 < len(tried) else high)
-        if high - low <= 1e-16 * top:
+        if high - low <= 1e-16 * top or high <= SMALLEST * top:
             break
     return low
 
 
-def _excess(demands: Demands, moves: Moves) -> tuple[float, float]:
-    """The largest excess over all demands but reach, and over reach."""
-    found = demands.worst(moves)
-    rest = max(float(most.max()) for status, most in found.items() if status != Status.OUT_OF_REACH)
-    return rest, float(found[Status.OUT_OF_REACH].max())
+def _excess(demands: Demands, cycles: list[Moves]) -> Array:
+    """(C, 2): the largest excess of every cycle over all demands but reach, and over reach."""
+    found = {
+        status: most.reshape(len(cycles), -1).max(axis=1)
+        for status, most in demands.worst(Moves.joined(cycles)).items()
+    }
+    reach = found.pop(Status.OUT_OF_REACH)
+    return np.stack([np.max(list(found.values()), axis=0), reach], axis=-1)
 
 
 def stride_of(
