@@ -36,8 +36,8 @@ def swing(tau: Array, step: Array, lift: Array, early: Array) -> Swing:
     u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
     first, second = 6.0 * tau * (1.0 - tau), 6.0 - 12.0 * tau
     rising = np.asarray(step[..., 1] >= 0.0)
-    rise, fall, rise1, rise2 = _part(u, rest, early, rising)
-    along, left, slope, curve = _part(u, rest, 1.0 - WAIT * (1.0 - early), ~rising)
+    rise, fall, rise1, rise2 = climb = _part(u, rest, 1.0 - early, rising)
+    along, left, slope, curve = _part(u, rest, WAIT * (1.0 - early), ~rising) if np.any(early < 1.0) else climb
     # sin^2(pi u) = X'(u) / 2
     hump, hump1 = (0.5 * rate for rate in _cycloid_rates(u, rest))
     hump2 = 2.0 * np.pi**2 * np.cos(2.0 * np.pi * u)
@@ -79,13 +79,12 @@ def _smooth(tau: Array) -> Array:
     return np.asarray(tau * tau * (3.0 - 2.0 * tau))
 
 
-def _part(u: Array, rest: Array, share: Array, first: BoolArray) -> tuple[Array, Array, Array, Array]:
-    """A cycloid within the ``first`` (or else the last) ``share`` of u, 1 less it, and its first two derivatives by
-    u."""
-    before, after = np.minimum(u / share, 1.0), np.minimum(rest / share, 1.0)
-    beyond = np.maximum((share - u) / share, 0.0)  # 1 - before
-    inside = np.maximum((share - rest) / share, 0.0)
-    done = np.where(first, cycloid(before), cycloid(inside))
-    left = np.where(first, cycloid(beyond), cycloid(after))
-    slope, curve = _cycloid_rates(np.where(first, before, inside), np.where(first, beyond, after))
-    return done, left, slope / share, curve / share**2
+def _part(u: Array, rest: Array, idle: Array, first: BoolArray) -> tuple[Array, Array, Array, Array]:
+    """A cycloid over all of u but an ``idle`` share at its end (``first``) or else at its beginning, 1 less it, and its
+    first two derivatives by u."""
+    share = 1.0 - idle
+    from_start = np.where(first, u, np.maximum(u - idle, 0.0)) / share
+    to_end = np.where(first, np.maximum(rest - idle, 0.0), rest) / share
+    from_start, to_end = np.minimum(from_start, 1.0), np.minimum(to_end, 1.0)
+    slope, curve = _cycloid_rates(from_start, to_end)
+    return cycloid(from_start), cycloid(to_end), slope / share, curve / share**2
