@@ -43,8 +43,8 @@ class Claim:
       ``tolerance`` of ``speed`` m/s. ``contacts``: names, all where there are none.
     * ``on_floor``: every capsule and sphere touches the floor all the time, to ``tolerance`` m.
     * ``supported``: the centre of mass stays between the lowest points of the contacts that carry load
-      (``Motion.contacts``), by at least ``required`` m, seen along the unit vector ``along`` (3,), from ``start`` to
-      ``end`` s where they are given.
+      (``Motion.contacts``), by at least ``required`` m: seen along the unit vector ``along`` (3,), or without one
+      inside their hull seen from above; from ``start`` to ``end`` s where they are given.
     * ``lifted``: between ``start`` and ``end`` (s), and again every ``every`` s (None: once), each of ``frames`` rises
       to ``height`` m above the higher of its places at both; ``stage`` names the phase; ``tolerance`` m.
     * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).

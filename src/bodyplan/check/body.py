@@ -8,7 +8,7 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.check.claims import allowance
 from bodyplan.check.report import Line
 from bodyplan.errors import Status
-from bodyplan.ground import Profile
+from bodyplan.ground import HeightMap, Profile, Surface
 from bodyplan.motion import Motion
 from bodyplan.robot.elements import Row
 from bodyplan.robot.neighbours import separate_contacts
@@ -241,6 +241,8 @@ def ground_clearance(motion: Motion) -> list[Line]:
     if isinstance(motion.ground, Profile):  # a corner of a step may reach through a link between two of the points
         floor = motion.ground.floor_alone().segment_clearance(ends) - radii
         gap = motion.ground.segment_clearance(ends) - radii
+    elif isinstance(motion.ground, (Surface, HeightMap)):  # curved: the tangent plane below a point is not the ground
+        floor = gap
     lines = [_worst_gap(motion, which, floor, "clear of the floor", EXACT)]
     lies = allowance(motion, "on_floor")
     if lies is not None:

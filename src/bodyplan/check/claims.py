@@ -10,6 +10,7 @@ import numpy as np
 from bodyplan import curves
 from bodyplan.arrays import Array
 from bodyplan.check.report import Line
+from bodyplan.check.support import polygon_margin
 from bodyplan.errors import UnknownNameError
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.elements import Contact
@@ -240,10 +241,10 @@ def lifted(motion: Motion, positions: Array, claim: Claim) -> Line:
 
 
 def supported(motion: Motion, positions: Array, claim: Claim) -> Line:
-    """Smallest distance, along the claimed direction, of the centre of mass from the rear and the front end of what
-    carries the robot; negative where it tips."""
+    """Smallest distance of the centre of mass from the edges of the support polygon or, along a claimed direction, from
+    the rear and the front end of what carries the robot; negative where it tips."""
     robot, t = motion.robot, motion.t
-    along, required = np.asarray(claim.data["along"], dtype=np.float64), float(claim.data["required"])
+    required = float(claim.data["required"])
     if motion.contacts is None or not robot.contacts:
         return _untested(claim, "the motion does not say which contacts carry load")
     if robot.mass <= 0.0:
@@ -253,6 +254,17 @@ def supported(motion: Motion, positions: Array, claim: Claim) -> Line:
     if not len(inside):
         return _untested(claim, "no sample falls into it")
     t = t[inside]
+    if "along" not in claim.data:
+        margin = polygon_margin(motion, inside)
+        k = int(margin.argmin())
+        value = float(margin[k])
+        if not np.isfinite(value):
+            return _failed(claim, f"at {t[k]:.4g} s fewer than three points carry the robot")
+        detail = f"{'tips' if value < 0.0 else 'least'} at {t[k]:.4g} s"
+        return Line(
+            claim.label, value, required, "m", value >= required - EXACT, detail, at_least=True, kind=claim.kind
+        )
+    along = np.asarray(claim.data["along"], dtype=np.float64)
     rear, centre, front = support_of(motion, along, inside)
     bare = np.flatnonzero(~np.isfinite(rear))
     if len(bare):

@@ -2,6 +2,7 @@
 
 from bodyplan.gaits.base import Gait
 from bodyplan.gaits.concertina import Concertina
+from bodyplan.gaits.crawl import Crawl
 from bodyplan.gaits.rectilinear import Rectilinear
 from bodyplan.gaits.rolling import Rolling
 from bodyplan.gaits.serpentine import Serpentine
@@ -10,7 +11,17 @@ from bodyplan.gaits.sinuslifting import SinusLifting
 
 #: every gait by its name in mission files
 KINDS: dict[str, type[Gait]] = {
-    gait.kind: gait for gait in (Concertina, Serpentine, SinusLifting, Sidewinding, Rolling, Rectilinear)
+    gait.kind: gait for gait in (Concertina, Serpentine, SinusLifting, Sidewinding, Rolling, Rectilinear, Crawl)
 }
 
-__all__ = ["KINDS", "Concertina", "Gait", "Rectilinear", "Rolling", "Serpentine", "Sidewinding", "SinusLifting"]
+__all__ = [
+    "KINDS",
+    "Concertina",
+    "Crawl",
+    "Gait",
+    "Rectilinear",
+    "Rolling",
+    "Serpentine",
+    "Sidewinding",
+    "SinusLifting",
+]

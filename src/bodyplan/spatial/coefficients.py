@@ -6,7 +6,7 @@
     D = (1 - A/(2 B))/x^2
 
 A and B have no cancellation when written with the half angle, B = (sin(x/2)/(x/2))^2 / 2. The closed forms of
-C, D and of dB/dx lose digits near 0: below z = x^2 = 1 their Taylor polynomials take over, to 1e-17.
+C and D lose digits near 0: below z = x^2 = 1 their Taylor polynomials take over, to 1e-17.
 What takes a ``Number`` works on floats and arrays in Python and on floats inside Numba kernels.
 """
 
@@ -37,19 +37,9 @@ def c_series(z: Number) -> Number:
 
 
 @_jitable
-def b_slope_series(z: Number) -> Number:
-    """dB/dx / x = (A - 2 B)/x^2 for z = x^2 < 1: the sum of 2 (-1)^(k+1) (k+1) z^k/(2k + 4)!."""
-    p = 1.0 - z * (7.0 / 1440.0) * (1.0 - z * (4.0 / 1071.0))
-    p = 1.0 - z * (2.0 / 135.0) * (1.0 - z * (5.0 / 528.0) * (1.0 - z * (3.0 / 455.0) * p))
-    return (-1.0 / 12.0) * (1.0 - z * (1.0 / 15.0) * (1.0 - z * (3.0 / 112.0) * p))
-
-
-@_jitable
-def slope_coefficients(z: float, a: float, b: float) -> tuple[float, float, float]:
-    """(C, dA/dx / x, dB/dx / x) at x = sqrt(z), given A and B."""
-    small = z < SERIES_BELOW
-    c = c_series(z) if small else (1.0 - a) / z
-    return c, c - b, b_slope_series(z) if small else (a - 2.0 * b) / z
+def c_coefficient(z: float, a: float) -> float:
+    """C at x = sqrt(z), given A."""
+    return c_series(z) if z < SERIES_BELOW else (1.0 - a) / z
 
 
 def sinc(x: Array) -> Array:
@@ -62,12 +52,6 @@ def coefficients(x: Array) -> tuple[Array, Array, Array]:
     """(A, B, C) at angles ``x`` (...,) rad."""
     a, b = sinc(x), 0.5 * sinc(0.5 * x) ** 2
     return a, b, _select(x * x, c_series, 1.0 - a)
-
-
-def slopes(x: Array) -> tuple[Array, Array]:
-    """(dA/dx / x, dB/dx / x) at angles ``x`` (...,) rad: C - B and (A - 2 B)/x^2."""
-    a, b, c = coefficients(x)
-    return c - b, _select(x * x, b_slope_series, a - 2.0 * b)
 
 
 def inverse_coefficient(x: Array) -> Array:

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, number
 from bodyplan.errors import InputError, SolveError, Status
-from bodyplan.spatial.coefficients import slope_coefficients
+from bodyplan.spatial.coefficients import c_coefficient
 from bodyplan.spatial.lanes import LANES, inlined, load, sines, strip, table, unload
 from bodyplan.spatial.poses import IDENTITY
 from bodyplan.spatial.rotations import matrix_from_quaternion
@@ -241,7 +241,7 @@ def increments(u: Array, first: int, h: Array, out: Array) -> None:
             # below 1e-150 squares underflow; there sin(x)/x is 1 to the last digit
             ratio = rows[0, 8 * L + l] / half if half > 1e-150 else 1.0
             b = 0.5 * ratio * ratio
-            c = slope_coefficients(4.0 * half * half, ratio * cosine, b)[0]
+            c = c_coefficient(4.0 * half * half, ratio * cosine)
             # V(w) v = v + B w x v + C w x (w x v)
             once = _cross(w, v)
             twice = _cross(w, once)

@@ -1,0 +1,238 @@
+"""A statically stable crawl on uneven ground: one leg swings, the others stand around the centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+
+from bodyplan.arrays import Array, finite, number
+from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.gaits.base import Gait, from_zero
+from bodyplan.gaits.crawl.legs import Legs
+from bodyplan.gaits.crawl.motion import motion_of
+from bodyplan.gaits.crawl.planner import Plan, Planner
+from bodyplan.gaits.crawl.steps import Course
+from bodyplan.ground.base import Ground
+from bodyplan.motion import Motion
+from bodyplan.robot.elements import Row
+from bodyplan.robot.model import Robot
+
+STABILITIES = ("margin", "barrier", "most")
+FOOTHOLDS = ("nearest", "search")
+BODIES = ("level", "follow")
+#: s of a step, sway and swing, where the user names no cycle time; longest stride as a share of a leg
+STEP_TIME, STRIDE = 3.0, 0.35
+#: share of the time in which a leg swings
+SWINGING = 0.6
+#: height of the body and outward reach of the feet, as shares of a leg
+HEIGHT, REACH = 0.385, 0.333
+
+
+class Crawl(Gait):
+    """A crawl: leg after leg swings while the body rests, and the body moves while all feet stand. Feet that stand do
+    not move at all; rates and accelerations of the joints are exact and vanish between the phases.
+
+    ``velocity`` (ahead, to the left) m/s in the body's heading and ``yaw_rate`` rad/s: of the steady motion (a third
+    number, up, must be 0: the ground says it). ``cycle_time`` s in which every leg swings once (default: 3 s a leg, or
+    less where the stride would be longer than 0.35 of a leg). ``duty``: share of the cycle that a foot stands, above
+    1 - 1/m for m legs (default 1 - 0.6/m: the body moves in 40 % of the time). ``sequence``: names of the legs in the
+    order in which they swing (default: from the rear to the front on the left, then on the right).
+
+    ``sway``: "auto", or the share (0: none) of the way from where the body would be to the centroid of the feet that
+    stand. ``stability``: how much sway "auto" takes: "margin", the least that keeps the centre of mass ``margin`` m
+    inside the support all the time of a swing; "barrier", the most of the sum of logarithms of the distances from the
+    edges less a cost of sway; "most", the largest margin.
+
+    ``step_height`` m of a swing over its straight line; more where the ground demands it. ``foothold``: "nearest" to
+    where the foot should be, or "search" within ``search_radius`` m for ground no steeper than ``max_slope`` rad.
+    ``height`` m of the body's frame over the feet's plane (default 0.385 of a leg), ``reach`` m of the feet outward
+    from their legs' roots (default 0.333). ``body``: "level", or "follow" the plane of the feet. ``start`` (x, y) m and
+    ``heading`` rad at time 0.
+
+    The centre of mass is that of the whole robot, swinging leg included. Statuses, from the time on when a step cannot
+    be made: ``tips_over`` (no sway gives the margin), ``out_of_reach``, ``no_contact`` (no foothold), ``below_floor``
+    (no way over the ground), and ``limit`` where a joint is beyond its limits or too fast; ``motion.notes`` say which
+    leg. Raises InputError for values out of range and for robots whose chains are not legs with three actuated joints.
+    """
+
+    kind: ClassVar[str] = "crawl"
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "velocity": "speed",
+        "yaw_rate": "angular_rate",
+        "step_height": "length",
+        "cycle_time": "time",
+        "margin": "length",
+        "max_slope": "angle",
+        "search_radius": "length",
+        "height": "length",
+        "reach": "length",
+        "start": "length",
+        "heading": "angle",
+    }
+
+    def __init__(
+        self,
+        velocity: Sequence[float] = (0.01, 0.0),
+        yaw_rate: float = 0.0,
+        *,
+        step_height: float = 0.05,
+        cycle_time: float | None = None,
+        duty: float | None = None,
+        sequence: Sequence[str] | None = None,
+        sway: Any = "auto",
+        stability: str = "margin",
+        margin: float = 0.02,
+        foothold: str = "nearest",
+        search_radius: float = 0.05,
+        max_slope: float = 0.6,
+        height: float | None = None,
+        reach: float | None = None,
+        body: str = "level",
+        start: Sequence[float] = (0.0, 0.0),
+        heading: float = 0.0,
+    ) -> None:
+        given = finite(velocity, "velocity")
+        if given.shape not in ((2,), (3,)) or (given.shape == (3,) and given[2] != 0.0):
+            raise InputError(f"velocity: expected (ahead, left) in m/s, and 0 if there is a third, got {velocity!r}.")
+        self.velocity = (float(given[0]), float(given[1]))
+        self.yaw_rate = number(yaw_rate, "yaw_rate")
+        self.step_height = number(step_height, "step_height", above=0.0)
+        self.cycle_time = None if cycle_time is None else number(cycle_time, "cycle_time", above=0.0)
+        self.duty = None if duty is None else number(duty, "duty", above=0.0, below=1.0)
+        self.sequence: tuple[str, ...] | None = None
+        if sequence is not None:
+            if isinstance(sequence, str) or not all(isinstance(name, str) for name in sequence):
+                raise InputError(f"sequence: expected names of legs, got {sequence!r}.")
+            self.sequence = tuple(sequence)
+        self.sway: str | float = "auto"
+        if isinstance(sway, str):
+            if sway != "auto":
+                raise UnknownNameError("sway", sway, ("auto",))
+        else:
+            self.sway = number(sway, "sway", at_least=0.0, at_most=1.0)
+        for name, value, valid in (
+            ("stability", stability, STABILITIES),
+            ("foothold", foothold, FOOTHOLDS),
+            ("body", body, BODIES),
+        ):
+            if value not in valid:
+                raise UnknownNameError(name, value, valid)
+        self.stability, self.foothold, self.body = stability, foothold, body
+        self.margin = number(margin, "margin")
+        self.search_radius = number(search_radius, "search_radius", above=0.0)
+        self.max_slope = number(max_slope, "max_slope", above=0.0, below=0.5 * np.pi)
+        self.height = None if height is None else number(height, "height", above=0.0)
+        self.reach = None if reach is None else number(reach, "reach")
+        x, y = finite(start, "start", (2,))
+        self.start = (float(x), float(y))
+        self.heading = number(heading, "heading")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The options as JSON types, with ``kind``."""
+        return {
+            "kind": self.kind,
+            "velocity": list(self.velocity),
+            "yaw_rate": self.yaw_rate,
+            "step_height": self.step_height,
+            "cycle_time": self.cycle_time,
+            "duty": self.duty,
+            "sequence": None if self.sequence is None else list(self.sequence),
+            "sway": self.sway,
+            "stability": self.stability,
+            "margin": self.margin,
+            "foothold": self.foothold,
+            "search_radius": self.search_radius,
+            "max_slope": self.max_slope,
+            "height": self.height,
+            "reach": self.reach,
+            "body": self.body,
+            "start": list(self.start),
+            "heading": self.heading,
+        }
+
+    def order(self, names: Sequence[str]) -> list[int]:
+        """Numbers of the legs in the order in which they swing. InputError where ``sequence`` does not name each once."""
+        if self.sequence is None:
+            return list(range(len(names)))
+        for name in self.sequence:
+            if name not in names:
+                raise UnknownNameError("leg", name, names, where="Crawl: sequence")
+        if sorted(self.sequence) != sorted(names):
+            raise InputError(f"Crawl: sequence must name every leg once, got {list(self.sequence)!r}.")
+        return [list(names).index(name) for name in self.sequence]
+
+    def planner(self, robot: Robot, ground: Ground) -> Planner:
+        """The planner for one robot and ground."""
+        legs = Legs.of(robot)
+        size = leg_length(legs)
+        height = HEIGHT * size if self.height is None else self.height
+        reach = REACH * size if self.reach is None else self.reach
+        offsets = legs.roots.copy()
+        out = np.linalg.norm(offsets[:, :2], axis=1)
+        if np.any(out <= 0.0):
+            raise InputError(f"Crawl: leg {legs.names[int(out.argmin())]!r} begins in the middle of the body.")
+        offsets[:, :2] *= ((out + reach) / out)[:, None]
+        offsets[:, 2] = 0.0
+        if self.sequence is None:
+            # from the rear to the front on the left, then on the right
+            side = np.where(offsets[:, 1] >= 0.0, 0, 1)
+            names = [legs.names[int(j)] for j in np.lexsort((offsets[:, 0], side))]
+            gait = Crawl(**({k: v for k, v in self.to_dict().items() if k != "kind"} | {"sequence": names}))
+        else:
+            gait = self
+        cycle = self._cycle(size, float(np.linalg.norm(offsets[:, :2], axis=1).max()), len(legs))
+        duty = 1.0 - SWINGING / len(legs) if self.duty is None else self.duty
+        swing = (1.0 - duty) * cycle
+        sway = cycle / len(legs) - swing
+        if sway <= 1e-9 * cycle:
+            raise InputError(
+                f"duty: {len(legs)} legs that swing one by one need more than {1.0 - 1.0 / len(legs):.4g}, got {duty}."
+            )
+        course = Course(self.velocity, self.yaw_rate, self.start, self.heading)
+        return Planner(gait, legs, ground, course, sway, swing, height, offsets)
+
+    def _cycle(self, size: float, radius: float, count: int) -> float:
+        if self.cycle_time is not None:
+            return self.cycle_time
+        speed = float(np.hypot(*self.velocity)) + abs(self.yaw_rate) * radius
+        longest = count * STEP_TIME
+        return longest if speed * longest <= STRIDE * size else STRIDE * size / speed
+
+    def period(self, robot: Robot, ground: Ground | None = None) -> float | None:
+        """Time in which every leg swings once, s, on a level floor; None on other ground."""
+        from bodyplan.ground.plane import Plane
+
+        on = Plane() if ground is None else ground
+        if not (isinstance(on, Plane) and not any(on.slope)):
+            return None
+        planner = self.planner(robot, on)
+        return planner.step_time * len(planner.legs)
+
+    def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
+        """The motion at times t (T,) >= 0 s."""
+        from_zero(t)
+        planner, plan = _planned(self, robot, ground, float(t[-1]))
+        return motion_of(self, planner, plan, t, self.period(robot, ground))
+
+
+def leg_length(legs: Legs) -> float:
+    """Mean over the legs of the lengths of their rows from the first actuated joint on, m."""
+    sizes = []
+    for leg in legs.legs:
+        chain = next(c for c in legs.robot.chains if c.name == leg.name)
+        first = next(d.element for d in leg.drives if d.column in leg.columns)
+        rows = [row for row in chain.elements[first:] if isinstance(row, Row)]
+        sizes.append(sum(abs(v) for row in rows for v in (row.a, row.d) if isinstance(v, float)))
+    size = float(np.mean(sizes))
+    if not size > 0.0:
+        raise InputError(f"Crawl: the legs of {legs.robot.name!r} have no length; name height and reach.")
+    return size
+
+
+@lru_cache(maxsize=8)
+def _planned(gait: Crawl, robot: Robot, ground: Ground, until: float) -> tuple[Planner, Plan]:
+    planner = gait.planner(robot, ground)
+    return planner, planner.made(until)

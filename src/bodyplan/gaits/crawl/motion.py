@@ -1,0 +1,232 @@
+"""From the steps of a crawl to a Motion: every joint exact in time, claims, loads, torques, and what to know."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray
+from bodyplan.errors import Status
+from bodyplan.gaits.crawl.holding import holding
+from bodyplan.gaits.crawl.planner import Plan, Planner, base_of, seen_from
+from bodyplan.gaits.crawl.steps import blend
+from bodyplan.motion import Claim, Motion
+from bodyplan.spatial import rotate
+from bodyplan.spatial.rotations import conjugate
+
+if TYPE_CHECKING:
+    from bodyplan.gaits.crawl.gait import Crawl
+
+EXACT = 1e-9
+#: share of a lift that may lie between two samples
+BETWEEN = 0.02
+
+
+def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float | None) -> Motion:
+    """The motion of a planned crawl at times ``t`` (T,) s; ``period`` s where it repeats."""
+    robot, count = planner.legs.robot, len(planner.legs)
+    poses, first, second = _body(plan, t)
+    feet = np.repeat(plan.feet[None], len(t), axis=0)
+    speed, change = np.zeros_like(feet), np.zeros_like(feet)
+    standing = np.ones((len(t), count), dtype=bool)
+    for step in plan.steps:
+        after = t >= step.lift_off
+        feet[after] = step.before
+        span = step.touch_down - step.lift_off
+        under_way = np.flatnonzero((t > step.lift_off) & (t < step.touch_down))
+        if len(under_way):
+            tau = (t[under_way] - step.lift_off) / span
+            place, velocity, acceleration = step.foot(tau)
+            feet[under_way, step.leg] = place
+            speed[under_way, step.leg] = velocity / span
+            change[under_way, step.leg] = acceleration / span**2
+            standing[under_way, step.leg] = False
+        feet[t >= step.touch_down] = step.after
+    base = base_of(poses)
+    turn, gain = _spin(poses, first, second)
+    back = conjugate(base[:, None, 3:])
+    seen = seen_from(base, feet)
+    w, dw = turn[:, None], gain[:, None]
+    moving = rotate(back, speed - first[:, None, :3]) - np.cross(w, seen)
+    rising = (
+        rotate(back, change - second[:, None, :3])
+        - 2.0 * np.cross(w, moving)
+        - np.cross(dw, seen)
+        - np.cross(w, np.cross(w, seen))
+    )
+    q, placed = planner.legs.place(seen, plan.guess)
+    solved = np.asarray(placed.all(axis=1))
+    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    if solved.any():
+        qd[solved], qdd[solved] = planner.legs.rates(q[solved], moving[solved], rising[solved])
+    residual = np.linalg.norm(planner.legs.feet(q) - seen, axis=-1).max(axis=1)
+    status = np.full(len(t), Status.OK.value, dtype="U24")
+    limits = robot.limits
+    beyond = np.asarray(np.any((q < limits[:, 0] - EXACT) | (q > limits[:, 1] + EXACT), axis=1))
+    fast = np.abs(qd) / robot.rates
+    status[beyond | (fast > 1.0 + EXACT).any(axis=1)] = Status.LIMIT.value
+    status[~solved] = Status.OUT_OF_REACH.value
+    if plan.status != Status.OK:
+        status[t >= plan.time - 1e-12] = plan.status.value
+    held = holding(planner.legs, q, base, standing)
+    contacts = np.zeros((len(t), len(robot.contacts)))
+    forces = None if held is None else np.zeros((len(t), len(robot.contacts), 3))
+    for j, leg in enumerate(planner.legs.legs):
+        contacts[:, leg.contact] = standing[:, j]
+        if held is not None and forces is not None:
+            forces[:, leg.contact, 2] = held.loads[:, j]
+    return Motion(
+        robot=robot,
+        ground=planner.ground,
+        gait=gait.to_dict(),
+        t=t,
+        base=base,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        residual=np.where(solved, residual, 0.0),
+        status=status,
+        claims=tuple(_claims(planner, plan, t, period)),
+        contacts=contacts,
+        forces=forces,
+        torques=None if held is None else held.torques,
+        facts=_facts(planner, plan, qd, period) | ({} if held is None else {"peak_holding_torque": held.peak}),
+        stages=tuple(_stages(planner, plan, period)),
+        notes=tuple(_notes(planner, plan, t, beyond, fast, solved)),
+    )
+
+
+def _body(plan: Plan, t: Array) -> tuple[Array, Array, Array]:
+    """x, y, z, roll, pitch, yaw (T, 6) and their first and second derivatives."""
+    poses = np.repeat(plan.first[None], len(t), axis=0)
+    first, second = np.zeros_like(poses), np.zeros_like(poses)
+    before = plan.first
+    for step in plan.steps:
+        rows = np.flatnonzero(t > step.begin)
+        span = step.lift_off - step.begin
+        value, rate, gain = blend(np.clip((t[rows] - step.begin) / span, 0.0, 1.0))
+        way = step.pose - before
+        poses[rows] = before + value[:, None] * way
+        moving = t[rows] < step.lift_off
+        first[rows] = (rate * moving)[:, None] * way / span
+        second[rows] = (gain * moving)[:, None] * way / span**2
+        before = step.pose
+    return poses, first, second
+
+
+def _spin(poses: Array, first: Array, second: Array) -> tuple[Array, Array]:
+    """Angular velocity and acceleration (T, 3) in the body's axes, from roll, pitch, yaw and their derivatives."""
+    roll, pitch = poses[:, 3], poses[:, 4]
+    r1, p1, y1 = first[:, 3], first[:, 4], first[:, 5]
+    r2, p2, y2 = second[:, 3], second[:, 4], second[:, 5]
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    turn = np.stack([r1 - y1 * sp, p1 * cr + y1 * cp * sr, y1 * cp * cr - p1 * sr], axis=1)
+    gain = np.stack(
+        [
+            r2 - y2 * sp - y1 * p1 * cp,
+            p2 * cr - p1 * r1 * sr + y2 * cp * sr - y1 * p1 * sp * sr + y1 * r1 * cp * cr,
+            y2 * cp * cr - y1 * p1 * sp * cr - y1 * r1 * cp * sr - p2 * sr - p1 * r1 * cr,
+        ],
+        axis=1,
+    )
+    return turn, gain
+
+
+def _stages(planner: Planner, plan: Plan, period: float | None) -> list[tuple[str, float, float]]:
+    out = []
+    for n, step in enumerate(plan.steps):
+        if period is not None and step.begin >= period - 1e-9:
+            break
+        cycle = "" if period is not None else f", cycle {n // len(planner.legs) + 1}"
+        name = planner.legs.names[step.leg]
+        out += [(f"sway for {name}{cycle}", step.begin, step.lift_off)]
+        out += [(f"{name} swings{cycle}", step.lift_off, step.touch_down)]
+    return out
+
+
+def _claims(planner: Planner, plan: Plan, t: Array, period: float | None) -> list[Claim]:
+    legs = planner.legs.legs
+    at_origin = [j for j, leg in enumerate(legs) if not np.any(leg.local)]
+    names = [planner.legs.robot.frames[leg.frame] for leg in legs]
+    out: list[Claim] = []
+    tau = np.linspace(0.0, 1.0, 101)
+    for n, step in enumerate(plan.steps):
+        if step.begin >= t[-1]:
+            break
+        stage = f"{planner.legs.names[step.leg]} swings, cycle {n // len(legs) + 1}"
+        end = min(step.touch_down, float(t[-1]))
+        window: dict[str, Any] = {"start": step.begin, "end": end, "every": None, "stage": stage}
+        still = [names[j] for j in at_origin if j != step.leg]
+        if still:
+            data = {"frames": still, **window, "tolerance": EXACT}
+            out.append(Claim("at_rest", f"standing feet at rest: {stage}", data))
+        if step.leg in at_origin and step.touch_down <= t[-1] + EXACT:
+            place, _, _ = step.foot(tau)
+            ends = max(float(step.before[step.leg, 2]), float(step.after[step.leg, 2]))
+            height = float(place[:, 2].max()) - ends
+            if height > 0.0:
+                data = {"frames": [names[step.leg]], **(window | {"start": step.lift_off}), "height": height,
+                        "tolerance": BETWEEN * height + EXACT}  # fmt: skip
+                out.append(Claim("lifted", f"swinging feet clear of the ground: {stage}", data))
+    if planner.legs.robot.mass > 0.0:
+        asked = planner.gait.margin if planner.gait.sway == "auto" else 0.0
+        out.append(Claim("supported", "the centre of mass is over the standing feet", {"required": min(asked, 0.0)}))
+    if period is not None and plan.status == Status.OK:
+        turn = planner.course.yaw_rate * period
+        (x0, y0), _ = planner.course.at(0.0)
+        (x1, y1), _ = planner.course.at(period)
+        c, s = np.cos(turn), np.sin(turn)
+        advance = [float(x1 - (c * x0 - s * y0)), float(y1 - (s * x0 + c * y0)), 0.0]
+        data = {"period": period, "advance": advance, "turn": turn, "tolerance": EXACT, "from_rest": True}
+        out.append(Claim("periodic", "the cycle closes", data))
+    return out
+
+
+def _facts(planner: Planner, plan: Plan, qd: Array, period: float | None) -> dict[str, float]:
+    count, cycle = len(planner.legs), planner.step_time * len(planner.legs)
+    speed = float(np.hypot(*planner.course.velocity))
+    out = {
+        "speed": speed,
+        "advance_per_cycle": speed * cycle,
+        "turn_per_cycle": planner.course.yaw_rate * cycle,
+        "cycle_time": cycle,
+        "swing_time": planner.swing_time,
+        "sway_time": planner.sway_time,
+        "body_height": planner.height,
+        "legs": float(count),
+        "peak_joint_rate": float(np.abs(qd).max(initial=0.0)),
+    }
+    if period is not None:
+        out["period"] = period
+    if plan.steps:
+        out["support_margin"] = min(step.margin for step in plan.steps)
+        out["largest_sway_share"] = max(step.share for step in plan.steps)
+        out["lift"] = max(step.lift for step in plan.steps)
+    return out
+
+
+def _notes(planner: Planner, plan: Plan, t: Array, beyond: BoolArray, fast: Array, solved: BoolArray) -> list[str]:
+    notes = [
+        "Feet that stand are fixed points: the joints follow from them and the body by exact inverse kinematics, so "
+        "that nothing drifts (open-loop rates, as in the paper, slip by millimetres a minute).",
+        "The centre of mass is that of the whole robot with its swinging leg; (19)-(22) put it at the body's frame.",
+    ]
+    if plan.status != Status.OK:
+        notes.append(f"Stops at {plan.time:.4g} s: {plan.reason}.")
+    for rows, what in ((~solved, "a foot is out of reach"), (beyond, "a joint is beyond its limits")):
+        if rows.any() and plan.status == Status.OK:
+            notes.append(f"From {t[int(rows.argmax())]:.4g} s on {what} ({int(rows.sum())} samples).")
+    if (fast > 1.0 + EXACT).any():
+        k, j = np.unravel_index(int(fast.argmax()), fast.shape)
+        notes.append(
+            f"{planner.legs.robot.joints[j]} is {fast[k, j]:.3g} times as fast as it may be at {t[k]:.4g} s: a slower "
+            "walk, a lower step_height or a smaller duty (longer swings) helps."
+        )
+    if plan.steps and planner.gait.sway != "auto" and min(step.margin for step in plan.steps) < 0.0:
+        worst = min(plan.steps, key=lambda step: step.margin)
+        name = planner.legs.names[worst.leg]
+        notes.append(
+            f"Tips: while {name} swings the centre of mass is {-1e3 * worst.margin:.4g} mm outside of its feet."
+        )
+    return notes
