@@ -44,12 +44,17 @@ def swing_by_hand(tau: Any, step: Any, lift: Any, early: Any) -> tuple[Any, Any]
     """Displacement along and up of a swing in mpmath: the formulas of its docstring, nothing rearranged."""
     u = smooth(tau)
     dx, dz = step
+    wait = mp.mpf(0.6) * (1 - early)
 
     def cycloid(v: Any) -> Any:
+        v = min(max(v, mp.mpf(0)), mp.mpf(1))
         return v - mp.sin(2 * mp.pi * v) / (2 * mp.pi)
 
-    climb = cycloid(min(u / early, mp.mpf(1))) if dz >= 0 else 1 - cycloid(min((1 - u) / early, mp.mpf(1)))
-    return dx * cycloid(u), dz * climb + lift * mp.sin(mp.pi * u) ** 2
+    if dz >= 0:
+        climb, along = cycloid(u / early), cycloid((u - wait) / (1 - wait))
+    else:
+        climb, along = 1 - cycloid((1 - u) / early), 1 - cycloid((1 - u - wait) / (1 - wait))
+    return dx * along, dz * climb + lift * mp.sin(mp.pi * u) ** 2
 
 
 def angles_by_hand(anchors: list[tuple[Any, Any]], links: Any) -> list[Any]:

@@ -30,7 +30,8 @@ def swing(tau: Array, step: Array, lift: Array, early: Array) -> Swing:
     step_z B(u) + ``lift`` sin^2(pi u) up: a cycloid over level ground. With ``early`` < 1 a step up rises within that
     share of u and goes along in what is left of it, B = X(u / early) up to 1 and X((u - w) / (1 - w)) from w on, with
     w = WAIT (1 - early); a step down is its mirror image. Near its ends the path goes as tau^6 along and as tau^4 up,
-    so that neither an anchor nor a leg that begins straight jumps in rate or acceleration.
+    so that neither an anchor nor a level leg that begins straight jumps in rate or acceleration (a sloping one, which
+    the lift bends as tau^2, jumps in acceleration).
     """
     tau, lift, early = (np.asarray(v, dtype=np.float64) for v in (tau, lift, early))
     u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
