@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bodyplan.arrays import Array, finite, number
+from bodyplan.arrays import Array, IntArray, finite, number
 from bodyplan.errors import InputError, Status
 from bodyplan.gaits.rectilinear.demands import MET, RATE_PLACES, Demands, move_names, phases
 from bodyplan.gaits.rectilinear.moves import Moves
@@ -24,6 +25,8 @@ SMALLEST = 1e-4
 TRIED, SHARES, GOLDEN = 17, 6, 10
 #: a stride so small that time and way are in proportion: without lift the fastest may be the smallest
 LEAST_SHARE = 0.01
+#: sizes of the first steps of the searches for the spacing of each kind of leg, and the most strides each tries
+SIMPLEXES, MOST_TRIED = (0.2, 0.1, 0.05, 0.03), 200
 #: places along a move at which rates are taken in the search
 FEW = 65
 #: shares of straight legs tried where straight ones cannot be lifted or a lift costs stride
@@ -165,7 +168,8 @@ def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least:
     """The fastest gait with legs at most ``longest`` (N - 1,) m; None where no stride meets the demands.
 
     Without rate limits it is the largest stride. With them a straight leg is slow to start, so that spacing and stride
-    are searched: the best stride of each spacing on a grid and by golden sections, and so the best spacing.
+    are searched: the best stride of each spacing on a grid and by golden sections, and so the best spacing; where legs
+    are not alike, then the spacing of each kind.
     """
     top = cache(lambda scale: largest_stride(demands, longest * scale, schedule, lift))
 
@@ -194,8 +198,47 @@ def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least:
             return best if best is None else replace(best, durations=demands.durations(best.moves, least))
     scale = _largest(lambda scale: speed(scale, best_share(scale)), np.linspace(1.0, 0.2, TRIED))
     best = at(scale, best_share(scale))
+    if best is not None and len(_kinds(demands, longest)[1]) > 1:
+        best = _leg_by_leg(demands, longest, schedule, lift, least, dwell, best)
     # the search takes rates at few places, the gait at many
     return None if best is None else replace(best, durations=demands.durations(best.moves, least))
+
+
+def _kinds(demands: Demands, longest: Array) -> tuple[IntArray, Array]:
+    """Which kind of leg each (N - 1,) is, and the first of every kind."""
+    legs = np.stack([demands.links[0::2], demands.links[1::2], longest], axis=-1) / demands.links.max()
+    _, first, which = np.unique(np.round(legs, 9), axis=0, return_index=True, return_inverse=True)
+    return which.ravel(), first
+
+
+def _leg_by_leg(
+    demands: Demands, longest: Array, schedule: str, lift: float, least: float, dwell: float, found: Stride
+) -> Stride:
+    """The fastest gait near ``found`` in which every kind of leg has a spacing of its own: the search of Nelder and
+    Mead, again and again from where it ended."""
+    from scipy.optimize import minimize
+
+    which, first = _kinds(demands, longest)
+
+    def stride(x: Array) -> Stride | None:
+        long, far = longest * x[which], float(x[-1])
+        if x[:-1].max() > 1.0 or not 0.0 < far <= float(np.min(long - demands.least)):
+            return None
+        tried = stride_of(demands, long, far, schedule, lift, least, places=FEW)
+        return tried if tried.status == Status.OK else None
+
+    long = found.spacings - start_spacings(np.zeros(len(longest)), found.stride, schedule)
+    best = np.append(long[first] / longest[first], found.stride)
+    for step in SIMPLEXES:
+        corners = np.array([best, *(best - step * np.diag(best))])
+        options: Any = {
+            "initial_simplex": corners,
+            "maxfev": min(60 * len(best), MOST_TRIED),
+            "xatol": 1e-4,
+            "fatol": 1e-7,
+        }
+        best = minimize(lambda x: -_speed(stride(x), dwell), best, method="Nelder-Mead", options=options).x
+    return max((found, stride(best)), key=lambda s: _speed(s, dwell)) or found
 
 
 def _speed(found: Stride | None, dwell: float) -> float:
