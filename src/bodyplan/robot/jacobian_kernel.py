@@ -24,7 +24,7 @@ from bodyplan.robot.values import (
     bend,
     drive_values,
 )
-from bodyplan.spatial.coefficients import slope_coefficients
+from bodyplan.spatial.coefficients import c_coefficient
 from bodyplan.spatial.lanes import fma, inlined, lane_count, load, strip, table, unload
 
 # rows of the flat table W: M, the axes x, y, z and the origin r; an arc's rotation (9), end point (3), E of
@@ -219,7 +219,7 @@ def _arc_rows(D: Array, length: float, W: Array, wide: int) -> None:
     for l in range(L):
         p, y, ratio = D[h, PITCH * L + l], D[h, YAW * L + l], D[h, RATIO * L + l]
         a, b = ratio * D[h, COSINE_HALF * L + l], 0.5 * ratio * ratio
-        c, a1, b1 = slope_coefficients(p * p + y * y, a, b)
+        c = c_coefficient(p * p + y * y, a)
         r00, r01, r02 = 1.0 - b * (p * p + y * y), -a * y, a * p
         r10, r11, r12 = a * y, 1.0 - b * y * y, b * p * y
         r20, r21, r22 = -a * p, b * p * y, 1.0 - b * p * p
@@ -232,19 +232,13 @@ def _arc_rows(D: Array, length: float, W: Array, wide: int) -> None:
             -length * b * p,
         )
         # v: the slope of the end point, turned into the end frame; omega: columns of V(phi)^T
-        x0, x1, x2 = length * p * a1, length * p * y * b1, -length * (b + p * p * b1)
-        W[E_PITCH * L + l] = r00 * x0 + r10 * x1 + r20 * x2
-        W[(E_PITCH + 1) * L + l] = r01 * x0 + r11 * x1 + r21 * x2
-        W[(E_PITCH + 2) * L + l] = r02 * x0 + r12 * x1 + r22 * x2
+        W[E_PITCH * L + l], W[(E_PITCH + 1) * L + l], W[(E_PITCH + 2) * L + l] = length * c * p, 0.0, -length * b
         W[(E_PITCH + 3) * L + l], W[(E_PITCH + 4) * L + l], W[(E_PITCH + 5) * L + l] = (
             b * y,
             1.0 - c * y * y,
             c * p * y,
         )
-        x0, x1, x2 = length * y * a1, length * (b + y * y * b1), -length * p * y * b1
-        W[E_YAW * L + l] = r00 * x0 + r10 * x1 + r20 * x2
-        W[(E_YAW + 1) * L + l] = r01 * x0 + r11 * x1 + r21 * x2
-        W[(E_YAW + 2) * L + l] = r02 * x0 + r12 * x1 + r22 * x2
+        W[E_YAW * L + l], W[(E_YAW + 1) * L + l], W[(E_YAW + 2) * L + l] = length * c * y, length * b, 0.0
         W[(E_YAW + 3) * L + l], W[(E_YAW + 4) * L + l], W[(E_YAW + 5) * L + l] = (
             -b * p,
             c * p * y,

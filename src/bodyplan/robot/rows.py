@@ -15,19 +15,16 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError
-from bodyplan.spatial.coefficients import coefficients, slopes
-from bodyplan.spatial.rotations import rotation_exp
-from bodyplan.spatial.twists import adjoint_inverse
+from bodyplan.robot.formulas import Scalar, arc_pose, arc_velocity, row_pose, row_velocity
+from bodyplan.spatial.coefficients import coefficients
 
 
 def row_transform(theta: ArrayLike, d: ArrayLike, a: ArrayLike, epsilon: ArrayLike) -> tuple[Array, Array]:
     """(position (..., 3) m, rotation (..., 3, 3)) of the new frame in the previous one:
     ``Rz(theta) Tz(d) Tx(a) Rx(epsilon)``. Angles in rad, lengths in m; InputError where not finite."""
     theta, d, a, epsilon = _together(theta=theta, d=d, a=a, epsilon=epsilon)
-    ct, st, ce, se = np.cos(theta), np.sin(theta), np.cos(epsilon), np.sin(epsilon)
-    zero = np.zeros_like(theta)
-    R = np.stack([ct, -st * ce, st * se, st, ct * ce, -ct * se, zero, se, ce], axis=-1)
-    return np.stack([a * ct, a * st, d], axis=-1), R.reshape(*theta.shape, 3, 3)
+    position, rotation = row_pose(np.cos(theta), np.sin(theta), d, a, np.cos(epsilon), np.sin(epsilon))
+    return _filled(position, theta.shape), _filled(rotation, theta.shape)
 
 
 def row_matrices(theta: ArrayLike, d: ArrayLike, a: ArrayLike, epsilon: ArrayLike) -> tuple[Array, Array]:
@@ -35,18 +32,9 @@ def row_matrices(theta: ArrayLike, d: ArrayLike, a: ArrayLike, epsilon: ArrayLik
 
     Paper *legs* eqs. (2)-(3), which are right for body-fixed twists.
     """
-    position, R = row_transform(theta, d, a, epsilon)
     theta, d, a, epsilon = _together(theta=theta, d=d, a=a, epsilon=epsilon)
-    ce, se = np.cos(epsilon), np.sin(epsilon)
-    E = np.zeros((*theta.shape, 6, 4))
-    # A, rows of v
-    E[..., 0, 2] = 1.0
-    E[..., 1, 0], E[..., 1, 1] = a * ce, se
-    E[..., 2, 0], E[..., 2, 1] = -a * se, ce
-    # B, rows of omega
-    E[..., 3, 3] = 1.0
-    E[..., 4, 0], E[..., 5, 0] = se, ce
-    return adjoint_inverse(position, R), E
+    D, E = row_velocity(np.cos(theta), np.sin(theta), d, a, np.cos(epsilon), np.sin(epsilon))
+    return _filled(D, theta.shape), _filled(E, theta.shape)
 
 
 def arc_transform(length: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> tuple[Array, Array]:
@@ -58,26 +46,25 @@ def arc_transform(length: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> tuple[
     """
     length, pitch, yaw = _together(length=length, pitch=pitch, yaw=yaw)
     A, B, _ = coefficients(np.hypot(pitch, yaw))
-    phi = np.stack([np.zeros_like(pitch), pitch, yaw], axis=-1)
-    return length[..., None] * np.stack([A, B * yaw, -B * pitch], axis=-1), rotation_exp(phi)
+    position, rotation = arc_pose(length, pitch, yaw, A, B)
+    return _filled(position, pitch.shape), _filled(rotation, pitch.shape)
 
 
 def arc_matrices(length: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> tuple[Array, Array]:
     """(D (..., 6, 6), E (..., 6, 2)) of an arc; columns of E: pitch, yaw. Regular when straight."""
-    position, R = arc_transform(length, pitch, yaw)
-    length, p, y = _together(length=length, pitch=pitch, yaw=yaw)
-    angle = np.hypot(p, y)
-    _, B, C = coefficients(angle)
-    A1, B1 = slopes(angle)
-    E = np.zeros((*p.shape, 6, 2))
-    # v: d(end point)/d(pitch), d/d(yaw), turned into the end frame
-    slope = np.stack([p * A1, y * A1, p * y * B1, B + y * y * B1, -B - p * p * B1, -p * y * B1], axis=-1)
-    E[..., :3, :] = np.swapaxes(R, -1, -2) @ (length[..., None, None] * slope.reshape(*p.shape, 3, 2))
-    # omega: columns 2 and 3 of the transposed left Jacobian I - B [phi] + C [phi]^2
-    E[..., 3, 0], E[..., 3, 1] = B * y, -B * p
-    E[..., 4, 0], E[..., 5, 1] = 1.0 - C * y * y, 1.0 - C * p * p
-    E[..., 4, 1] = E[..., 5, 0] = C * p * y
-    return adjoint_inverse(position, R), E
+    length, pitch, yaw = _together(length=length, pitch=pitch, yaw=yaw)
+    D, E = arc_velocity(length, pitch, yaw, *coefficients(np.hypot(pitch, yaw)))
+    return _filled(D, pitch.shape), _filled(E, pitch.shape)
+
+
+def _filled(entries: list[Scalar], shape: tuple[int, ...]) -> Array:
+    """Nested lists of scalars and arrays (...,) as one array (..., *sizes of the lists)."""
+    rows = entries if isinstance(entries[0], list) else [[entry] for entry in entries]
+    out = np.empty((*shape, len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        for j, value in enumerate(row):
+            out[..., i, j] = value
+    return out if isinstance(entries[0], list) else out[..., 0]
 
 
 def _together(**values: ArrayLike) -> tuple[Array, ...]:
