@@ -13,14 +13,18 @@ named joint coordinate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, frozen, number
 from bodyplan.errors import InputError
+
+COS_30 = math.sqrt(0.75)
 
 
 def _named(value: object, field: str) -> str:
@@ -90,7 +94,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class WheelRadius:
-    """Radius law of a three-legged wheel (paper *wheels*): ``link cos(q/2) cos(30 deg) + rubber``.
+    """Radius law of a three-legged wheel (paper *wheels*, eq. (1)): ``link cos(q/2) cos(30 deg) + rubber``.
 
     ``joint`` is the adjusting angle q (rad, in [0, pi] unless the joint has limits), ``link`` the leg
     length w and ``rubber`` the tread thickness R_ru in m. May drive a length (``d`` or ``a``) only.
@@ -107,6 +111,19 @@ class WheelRadius:
             raise InputError("WheelRadius.joint: offset must be 0 and scale 1, the law takes the angle itself.")
         number(self.link, "WheelRadius.link", above=0.0)
         number(self.rubber, "WheelRadius.rubber", at_least=0.0)
+
+    @property
+    def largest(self) -> float:
+        """Radius at q = 0, m."""
+        return self.link * COS_30 + self.rubber
+
+    def radius(self, q: ArrayLike) -> Array:
+        """Radius (...,) m at q (...,) rad."""
+        return np.asarray(self.rubber + self.link * COS_30 * np.cos(0.5 * np.asarray(q)))
+
+    def slope(self, q: ArrayLike) -> Array:
+        """dR/dq (...,) m/rad (paper *wheels*, eq. (33))."""
+        return np.asarray(-0.5 * self.link * COS_30 * np.sin(0.5 * np.asarray(q)))
 
 
 Drive = Joint | WheelRadius
@@ -246,7 +263,8 @@ class Contact:
     ``shape``: ``"capsule"`` (from ``start`` to ``end``), ``"sphere"`` (at ``start``), ``"box"``
     (centred at ``start``, ``half`` sizes), ``"rim"`` (circle of ``radius`` about the frame's z at ``start``).
     Points are (3,) m in the frame ``frame``. ``radius`` in m. ``friction``: Coulomb coefficient towards
-    ground that names none of its own, or None.
+    ground that names none of its own, or None. ``drive``: the law by which a rim's radius follows a joint; ``radius``
+    is then the largest (and need not be given), :func:`bodyplan.robot.rims.contact_radii` has that at a joint angle.
     """
 
     name: str
@@ -257,6 +275,7 @@ class Contact:
     end: tuple[float, float, float] = (0.0, 0.0, 0.0)
     half: tuple[float, float, float] = (0.0, 0.0, 0.0)
     friction: float | None = None
+    drive: WheelRadius | None = None
 
     SHAPES: ClassVar[tuple[str, ...]] = ("capsule", "sphere", "box", "rim")
 
@@ -266,6 +285,8 @@ class Contact:
         if self.shape not in self.SHAPES:
             raise InputError(f"{where}.shape: must be one of {', '.join(self.SHAPES)}, got {self.shape!r}.")
         number(self.radius, f"{where}.radius", at_least=0.0)
+        if self.drive is not None:
+            self._check_drive(where)
         for field in ("start", "end", "half"):
             point = finite(getattr(self, field), f"{where}.{field}", (3,))
             object.__setattr__(self, field, tuple(float(x) for x in point))
@@ -275,6 +296,15 @@ class Contact:
             raise InputError(f"{where}.half: box half sizes must be > 0, got {self.half!r}.")
         if self.friction is not None:
             number(self.friction, f"{where}.friction", at_least=0.0)
+
+    def _check_drive(self, where: str) -> None:
+        if not isinstance(self.drive, WheelRadius) or self.shape != "rim":
+            raise InputError(f"{where}.drive: must be the WheelRadius of a rim, got {self.drive!r} of a {self.shape}.")
+        if self.radius not in (0.0, self.drive.largest):
+            raise InputError(
+                f"{where}.radius: a rim with a drive has its largest radius, {self.drive.largest!r}; got {self.radius!r}."
+            )
+        object.__setattr__(self, "radius", self.drive.largest)
 
     def points(self) -> Array:
         """Points of the shape's skeleton in its frame, (p, 3) m: add ``radius`` for its surface."""

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,9 @@ from bodyplan.robot.poses import Poses
 from bodyplan.robot.reach import Reach, reach
 from bodyplan.robot.rows import arc_matrices, row_matrices
 from bodyplan.robot.tables import Paths, Tables, build_paths, build_tables
+
+if TYPE_CHECKING:
+    from bodyplan.robot.symbolic import SymbolicRobot
 
 
 @dataclass(frozen=True, repr=False)
@@ -252,6 +255,14 @@ class Robot:
         element, q = self.elements[index - 1], self.vector(q)
         values = [batch.variable(getattr(element, field), q, self._column) for field in element.VARIABLES]
         return arc_matrices(element.length, *values) if isinstance(element, Arc) else row_matrices(*values)
+
+    def symbolic(self) -> SymbolicRobot:
+        """The same model in SymPy symbols named like the joints: ``.P``, ``.Q``, ``.D(frame)``, ``.E(frame)``,
+        ``.forward(frame)``, ``.jacobian(frame)``, and as text ``.latex()``, ``.python()``, ``.c_source()`` (C99).
+        MissingExtraError without the extra "symbolic"."""
+        from bodyplan.robot.symbolic import SymbolicRobot
+
+        return SymbolicRobot(self)
 
     @cached_property
     def _column(self) -> dict[str, int]:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray, frozen
-from bodyplan.robot.elements import Arc, Chain, Joint, WheelRadius
+from bodyplan.robot.elements import COS_30, Arc, Chain, Joint, WheelRadius
 
 # ints: F, V, n, C, S, K, M, then the tables element_i (F, 6), drive_i (V, 3), starts (C + 1),
 #       offsets (C + 1), steps (S, 14)
@@ -37,7 +37,6 @@ LINEAR, WHEEL = 0, 1
 ROW_ANGLE, OTHER = 1, 0
 # what to do in a step: only constants; one revolute theta; any drives; an arc
 FIXED, REVOLUTE, GENERAL, BEND = 0, 1, 2, 3
-COS_30 = float(np.sqrt(0.75))
 
 
 class Tables(NamedTuple):
