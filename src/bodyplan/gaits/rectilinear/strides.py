@@ -204,11 +204,11 @@ def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least:
     return None if best is None else replace(best, durations=demands.durations(best.moves, least))
 
 
-def _kinds(demands: Demands, longest: Array) -> tuple[IntArray, Array]:
+def _kinds(demands: Demands, longest: Array) -> tuple[IntArray, IntArray]:
     """Which kind of leg each (N - 1,) is, and the first of every kind."""
     legs = np.stack([demands.links[0::2], demands.links[1::2], longest], axis=-1) / demands.links.max()
     _, first, which = np.unique(np.round(legs, 9), axis=0, return_index=True, return_inverse=True)
-    return which.ravel(), first
+    return np.asarray(which.ravel(), dtype=np.int64), np.asarray(first, dtype=np.int64)
 
 
 def _leg_by_leg(
@@ -227,17 +227,16 @@ def _leg_by_leg(
         tried = stride_of(demands, long, far, schedule, lift, least, places=FEW)
         return tried if tried.status == Status.OK else None
 
+    def slowness(x: Array) -> float:
+        return -_speed(stride(x), dwell)
+
     long = found.spacings - start_spacings(np.zeros(len(longest)), found.stride, schedule)
     best = np.append(long[first] / longest[first], found.stride)
+    free: dict[str, Any] = {"maxfev": min(60 * len(best), MOST_TRIED), "xatol": 1e-4, "fatol": 1e-7}
     for step in SIMPLEXES:
         corners = np.array([best, *(best - step * np.diag(best))])
-        options: Any = {
-            "initial_simplex": corners,
-            "maxfev": min(60 * len(best), MOST_TRIED),
-            "xatol": 1e-4,
-            "fatol": 1e-7,
-        }
-        best = minimize(lambda x: -_speed(stride(x), dwell), best, method="Nelder-Mead", options=options).x
+        options: Any = {"initial_simplex": corners, **free}
+        best = np.asarray(minimize(slowness, best, method="Nelder-Mead", options=options).x)
     return max((found, stride(best)), key=lambda s: _speed(s, dwell)) or found
 
 
