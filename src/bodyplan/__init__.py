@@ -48,8 +48,10 @@ if TYPE_CHECKING:
         WheelRadius,
         acm_l2,
         hexapod,
+        rover,
         silo4,
         snake,
+        tri_wheel,
         walker,
     )
     from bodyplan.show import show
@@ -75,8 +77,10 @@ _FACE = {
     "WheelRadius": "robot",
     "acm_l2": "robot",
     "hexapod": "robot",
+    "rover": "robot",
     "silo4": "robot",
     "snake": "robot",
+    "tri_wheel": "robot",
     "walker": "robot",
     "Corridor": "ground",
     "HeightMap": "ground",

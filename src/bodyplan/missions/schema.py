@@ -18,6 +18,7 @@ from bodyplan import gaits
 from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
 from bodyplan.robot.library import acm_l2, snake
 from bodyplan.robot.model import Robot
+from bodyplan.robot.rovers import rover, tri_wheel
 from bodyplan.robot.walkers import hexapod, silo4, walker
 from bodyplan.units import SI_UNITS, to_si
 
@@ -47,6 +48,23 @@ _LEG_UNITS = {
     "rate": "angular_rate",
     "effort": "torque",
 }
+_WHEEL_UNITS = {
+    "link": "length",
+    "half_length": "length",
+    "half_width": "length",
+    "rubber": "length",
+    "radius": "length",
+    "body": "length",
+    "thickness": "length",
+    "mass": "mass",
+    "com": "length",
+    "wheel_mass": "mass",
+    "limits": "angle",
+    "rate": "angular_rate",
+    "effort": "torque",
+    "spin_rate": "angular_rate",
+    "spin_effort": "torque",
+}
 
 
 def _robot_file(path: str) -> Robot:
@@ -66,6 +84,8 @@ ROBOTS: dict[str, tuple[Builder, Mapping[str, str]]] = {
     "silo4": (silo4, _LEG_UNITS),
     "hexapod": (hexapod, _LEG_UNITS),
     "walker": (walker, _LEG_UNITS),
+    "tri_wheel": (tri_wheel, _WHEEL_UNITS),
+    "rover": (rover, _WHEEL_UNITS),
     "file": (_robot_file, {}),
     "table": (_robot_table, {}),
 }

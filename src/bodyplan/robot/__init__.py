@@ -5,6 +5,7 @@ from bodyplan.robot.library import acm_l2, snake
 from bodyplan.robot.model import Robot
 from bodyplan.robot.poses import Poses
 from bodyplan.robot.reach import Reach
+from bodyplan.robot.rovers import rover, tri_wheel
 from bodyplan.robot.walkers import hexapod, silo4, walker
 
 __all__ = [
@@ -20,7 +21,9 @@ __all__ = [
     "WheelRadius",
     "acm_l2",
     "hexapod",
+    "rover",
     "silo4",
     "snake",
+    "tri_wheel",
     "walker",
 ]

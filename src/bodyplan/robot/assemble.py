@@ -52,7 +52,7 @@ def assemble(
         # the default of WheelRadius, now that nothing else can say otherwise
         if joints[name].limits is None:
             joints[name] = replace(joints[name], limits=(0.0, math.pi))
-    return _with_properties(chains, joints), contacts
+    return _with_properties(chains, joints), tuple(_followed(contact, joints) for contact in contacts)
 
 
 def declare(chains: tuple[Chain, ...], joints: Sequence[Joint | str]) -> tuple[Chain, ...]:
@@ -153,6 +153,16 @@ def _wheel_joints(chains: tuple[Chain, ...]) -> set[str]:
         for field in element.VARIABLES
         if isinstance(value := getattr(element, field), WheelRadius)
     }
+
+
+def _followed(contact: Contact, joints: Mapping[str, Joint]) -> Contact:
+    """The contact, its drive with all that is known of the joint."""
+    if contact.drive is None:
+        return contact
+    name = contact.drive.joint.name
+    if name not in joints:
+        raise UnknownNameError("joint", name, joints, where=f"Contact({contact.name!r}).drive")
+    return replace(contact, drive=replace(contact.drive, joint=joints[name]))
 
 
 def _with_properties(chains: tuple[Chain, ...], joints: Mapping[str, Joint]) -> tuple[Chain, ...]:

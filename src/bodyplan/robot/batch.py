@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.elements import Joint, Variable, WheelRadius
-from bodyplan.robot.tables import COS_30
 from bodyplan.threads import shared
 
 FLOAT = np.dtype(np.float64)
@@ -95,5 +94,5 @@ def variable(value: Variable, q: Array, column: Mapping[str, int]) -> Any:
     if isinstance(value, Joint):
         return value.offset + value.scale * q[..., column[value.name]]
     if isinstance(value, WheelRadius):
-        return value.rubber + value.link * COS_30 * np.cos(0.5 * q[..., column[value.joint.name]])
+        return value.radius(q[..., column[value.joint.name]])
     return np.full(q.shape[:-1], value)

@@ -85,6 +85,8 @@ def _value(value: Any) -> Any:
         return [_value(v) for v in value]
     if isinstance(value, (bool, str)):
         return value
+    if isinstance(value, WheelRadius):
+        return {"wheel_radius": value.joint.name, "link": float(value.link), "rubber": float(value.rubber)}
     return float(value) if math.isfinite(value) else str(float(value))
 
 
@@ -95,11 +97,7 @@ def _element_data(element: Element) -> dict[str, Any]:
     for field in element.VARIABLES:
         value = getattr(element, field)
         if isinstance(value, WheelRadius):
-            out[field] = {
-                "wheel_radius": value.joint.name,
-                "link": float(value.link),
-                "rubber": float(value.rubber),
-            }
+            out[field] = _value(value)
         elif isinstance(value, Joint):
             out[field] = {"joint": value.name, "offset": float(value.offset), "scale": float(value.scale)}
         else:
@@ -167,7 +165,9 @@ def _made(make: type[Any], data: Any, where: str) -> Any:
     known = dict(_table(data, where, tuple(field.name for field in fields(make))))
     for field, value in known.items():
         at = f"{where}.{field}"
-        if isinstance(value, (list, tuple)):
+        if field == "drive":
+            known[field] = variable(value, "length", at)
+        elif isinstance(value, (list, tuple)):
             known[field] = tuple(
                 quantity(v, _DIMENSIONS[field], at) if field in _DIMENSIONS else number(v, at) for v in value
             )

@@ -301,9 +301,8 @@ class Contact:
         if not isinstance(self.drive, WheelRadius) or self.shape != "rim":
             raise InputError(f"{where}.drive: must be the WheelRadius of a rim, got {self.drive!r} of a {self.shape}.")
         if self.radius not in (0.0, self.drive.largest):
-            raise InputError(
-                f"{where}.radius: a rim with a drive has its largest radius, {self.drive.largest!r}; got {self.radius!r}."
-            )
+            largest = self.drive.largest
+            raise InputError(f"{where}.radius: a rim with a drive has its largest, {largest!r} m; got {self.radius!r}.")
         object.__setattr__(self, "radius", self.drive.largest)
 
     def points(self) -> Array:
