@@ -154,7 +154,7 @@ class Crawl(Gait):
         }
 
     def order(self, names: Sequence[str]) -> list[int]:
-        """Numbers of the legs in the order in which they swing. InputError where ``sequence`` does not name each once."""
+        """Numbers of the legs in the order in which they swing. InputError where ``sequence`` is not all of them."""
         if self.sequence is None:
             return list(range(len(names)))
         for name in self.sequence:

@@ -169,7 +169,7 @@ class Planner:
         stance = before[others]
         centroid = stance[:, :2].mean(axis=0)
         shares = np.linspace(0.0, 1.0, SHARES) if self.gait.sway == "auto" else np.array([float(self.gait.sway)])
-        poses = np.stack([self._pose(at + s * (centroid - at), heading, before) for s in shares])
+        poses = np.stack([self.pose(at + s * (centroid - at), heading, before) for s in shares])
         swung, _, _ = swing_path(before[leg], after[leg], *shape, PLACES)
         feet = np.repeat(before[None], len(PLACES), axis=0)
         feet[:, leg] = swung
@@ -202,7 +202,7 @@ class Planner:
                 return int(best.argmax())
         return int(np.where(reachable > 0.0, least, -np.inf).argmax())
 
-    def _pose(self, at: Array, heading: float, feet: Array) -> Array:
+    def pose(self, at: Array, heading: float, feet: Array) -> Array:
         """(6,) x, y, z, roll, pitch, yaw over the plane through all feet, level or along it."""
         radii = np.array([leg.radius for leg in self.legs.legs])
         ground = feet - radii[:, None] * [0.0, 0.0, 1.0]
