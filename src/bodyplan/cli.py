@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from bodyplan.terminal import bad_input, number_or_text, print_table, progress_bar, say
 
 # everything else is imported inside the commands: --help must answer at once
 if TYPE_CHECKING:
@@ -64,10 +63,10 @@ def run(
     compare: Annotated[bool, typer.Option(help="Run the missions that this one is compared with.")] = True,
 ) -> None:
     """Plan, check and simulate a mission; write its folder and report.html."""
-    with _bad_input():
+    with bad_input():
         from bodyplan import job
 
-        with _progress() as progress:
+        with progress_bar() as progress:
             result = job.run(
                 mission, out, overrides=set_ or (), force=force, simulate=simulate, compare=compare, progress=progress
             )
@@ -80,7 +79,7 @@ def check(
     mission: Annotated[str, typer.Argument(help="A mission, or a motion saved as .npz.")], set_: SetOption = None
 ) -> None:
     """Plan a mission (or load a motion) and let the judge test it."""
-    with _bad_input():
+    with bad_input():
         from bodyplan.check import check as judge
 
         motion = _motion(mission, set_)
@@ -98,7 +97,7 @@ def export(
     force: ForceOption = False,
 ) -> None:
     """Write a motion in another format."""
-    with _bad_input():
+    with bad_input():
         from bodyplan.errors import InputError, UnknownNameError
         from bodyplan.export import FORMATS, save
         from bodyplan.files import refuse_existing
@@ -137,7 +136,7 @@ def fit(
     force: ForceOption = False,
 ) -> None:
     """Fit the joints of a snake to a body curve; print and draw how well they match."""
-    with _bad_input():
+    with bad_input():
         from bodyplan import job
         from bodyplan.errors import SolveError
         from bodyplan.missions.curve_input import load_curve
@@ -147,7 +146,7 @@ def fit(
 
         name, body_curve = load_curve(curve, set_ or ())
         target = job.fit_target(name, out, force)
-        with _progress() as progress:
+        with progress_bar() as progress:
             outcome = FitOutcome.of(
                 name,
                 body_curve,
@@ -155,22 +154,22 @@ def fit(
                 joint=joint,
                 axes=axes,
                 end_link=end_link,
-                limit=None if limit is None else to_si(_plain(limit), "angle", "limit"),
+                limit=None if limit is None else to_si(number_or_text(limit), "angle", "limit"),
                 method=method,
                 p=p,
-                start=to_si(_plain(start), "length", "start"),
+                start=to_si(number_or_text(start), "length", "start"),
                 convergence=convergence,
                 progress=progress,
             )
             progress("writing", 0.0)
             written = job.write_fit(outcome, target, force)
-        _say(f"\n{outcome.title}", bold=True)
+        say(f"\n{outcome.title}", bold=True)
         typer.echo(fit_text(outcome))
         if not outcome.ok:
             try:
                 outcome.fit.raise_if_failed()
             except SolveError as error:
-                _say(f"\n  status     {error}", fg=typer.colors.RED)
+                say(f"\n  status     {error}", fg=typer.colors.RED)
         typer.echo(f"\n  written    {written}")
     raise typer.Exit(0 if outcome.ok else 1)
 
@@ -181,7 +180,7 @@ def missions(
     schema: Annotated[bool, typer.Option("--schema", help="Print the options of every kind as JSON Schema.")] = False,
 ) -> None:
     """List the ready missions, or print one."""
-    with _bad_input():
+    with bad_input():
         from bodyplan.errors import UnknownNameError
         from bodyplan.missions import load_mission, ready_missions
 
@@ -198,14 +197,14 @@ def missions(
                 raise UnknownNameError("mission", name, ready)
             typer.echo(ready[name], nl=False)
             return
-        _table(["mission", "what it is"], [[n, load_mission(n).title] for n in ready])
+        print_table(["mission", "what it is"], [[n, load_mission(n).title] for n in ready])
         typer.echo("bodyplan missions NAME prints one: save it as my.toml, change it, and bodyplan run my.toml")
 
 
 @app.command()
 def robots() -> None:
     """List the robots that a mission can name, with their options."""
-    with _bad_input():
+    with bad_input():
         import inspect
 
         from bodyplan.missions.schema import ROBOTS
@@ -219,7 +218,50 @@ def robots() -> None:
                 for p in inspect.signature(builder).parameters.values()
             ]
             rows.append([kind, about, ", ".join(options)])
-        _table(["kind", "what it is", "options"], rows)
+        print_table(["kind", "what it is", "options"], rows)
+
+
+@app.command()
+def model(
+    robot: Annotated[
+        str, typer.Argument(help="A robot's .csv (extended D-H table) or .toml, or a name (see: bodyplan robots).")
+    ],
+    symbolic: Annotated[
+        bool, typer.Option("--symbolic", help="Write the formulas: NAME.tex (LaTeX) and NAME.py (NumPy).")
+    ] = False,
+    c: Annotated[
+        Path | None, typer.Option("--c", metavar="DIR", help="Write C99 source, NAME.h and NAME.c, into this folder.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the formulas (default: that of --c, or runs/model-NAME).")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help='An option of a named robot, for example mass="20 kg".'),
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Print a robot's chains, rows and joints; write its kinematics as formulas and as C."""
+    with bad_input():
+        from bodyplan.errors import InputError
+        from bodyplan.missions.robot_input import load_robot
+        from bodyplan.robot.summary import summary
+
+        if out is not None and not symbolic:
+            raise InputError(f"--out {out}: is the folder for formulas; ask for them with --symbolic.")
+        loaded = load_robot(robot, set_ or ())
+        written: list[Path] = []
+        if symbolic or c is not None:
+            from bodyplan.robot.symbolic.writing import write_model
+
+            written = write_model(loaded.symbolic(), symbolic=symbolic, c=c, out=out, force=force)
+        head, tables = summary(loaded)
+        say(head, bold=True)
+        for title, header, rows in tables:
+            say(f"\n{title}", bold=True)
+            print_table(header, rows)
+        for path in written:
+            typer.echo(f"{'' if path is not written[0] else chr(10)}written  {path}")
 
 
 def _motion(mission: str, overrides: list[str] | None) -> Motion:
@@ -238,92 +280,12 @@ def _motion(mission: str, overrides: list[str] | None) -> Motion:
     return plan_mission(loaded)
 
 
-@contextmanager
-def _bad_input() -> Iterator[None]:
-    """Errors of the user's making end with one message and exit code 2."""
-    from bodyplan.errors import BodyplanError
-
-    try:
-        yield
-    except BodyplanError as error:
-        typer.echo(f"error: {error}", err=True)
-        raise typer.Exit(2) from None
-    except BrokenPipeError:
-        raise typer.Exit(0) from None
-    except OSError as error:
-        typer.echo(f"error: {error.strerror or error}: {error.filename or ''}".rstrip(": "), err=True)
-        raise typer.Exit(2) from None
-    except (MemoryError, RecursionError):
-        typer.echo("error: the input is too large or too deeply nested for this machine", err=True)
-        raise typer.Exit(2) from None
-    except KeyboardInterrupt:
-        typer.echo("stopped; nothing was written", err=True)
-        raise typer.Exit(130) from None
-
-
-@contextmanager
-def _progress() -> Iterator[Any]:
-    """A progress bar on a terminal, one line a step elsewhere."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        said: list[str] = []
-
-        def say(step: str, part: float) -> None:
-            if step not in said:
-                said.append(step)
-                typer.echo(f"{step} ...", err=True)
-
-        yield say
-        return
-    columns = (
-        TextColumn("{task.description:12}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def show(step: str, part: float) -> None:
-            bar.update(task, description=step, completed=part)
-
-        yield show
-
-
-def _plain(text: str) -> str | float:
-    """A number where the text is one: SI then, as in a mission file."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-def _say(text: str, **style: Any) -> None:
-    """Styled, unless the user asked for no colour (NO_COLOR)."""
-    typer.secho(text, color=False if os.environ.get("NO_COLOR") else None, **style)
-
-
-def _table(header: list[str], rows: list[list[str]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for title in header:
-        table.add_column(title, overflow="fold")
-    for row in rows:
-        table.add_row(*(str(cell).replace("[", r"\[") for cell in row))
-    Console().print(table)
-
-
 def _print_checks(report: Any) -> None:
     for line in report:
         colour = {True: None, False: typer.colors.RED, None: typer.colors.YELLOW}[line.passed]
-        _say(str(line), fg=colour)
+        say(str(line), fg=colour)
     failed = len(report.failures)
-    _say(
+    say(
         f"{failed} of {len(report.lines)} checks failed" if failed else f"all {len(report.lines)} checks passed",
         bold=True,
     )
@@ -337,9 +299,9 @@ def _summary(result: Result) -> None:
     """One screen: verdict, key figures, the comparison, where the report is."""
     outcome, plan = result.outcome, result.outcome.motion.facts
     report, trial = outcome.report, outcome.trial
-    _say(f"\n{outcome.title}", bold=True)
+    say(f"\n{outcome.title}", bold=True)
     for line in report.failures:
-        _say(str(line), fg=typer.colors.RED)
+        say(str(line), fg=typer.colors.RED)
     failed = len(report.failures)
     warnings = [note.removeprefix("Warning: ") for note in outcome.motion.notes if note.startswith("Warning: ")]
     typer.echo(f"  checks     {len(report.lines) - failed} passed, {failed} failed")
@@ -362,7 +324,7 @@ def _summary(result: Result) -> None:
                 own = "" if row.forward_ratio is None else f", {row.forward_ratio:.1%} along its own heading"
                 typer.echo(f"             {row.no_slip_ratio:.1%} of the speed without slip{own}{angle}")
         else:
-            _say(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
+            say(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
         from bodyplan.show.remarks import gathered
 
         warnings += gathered(trial, outcome.motion.robot)
@@ -372,7 +334,7 @@ def _summary(result: Result) -> None:
         typer.echo(f"             and {len(warnings) - 5} more in the report")
     if outcome.others:
         typer.echo("")
-        _table(
+        print_table(
             ["mission", "executed / planned", "speed"],
             [
                 [o.name, "-" if o.ratio is None else f"{o.ratio:.2f}", _figure(o.speed, "mm/s", 1e3)]
