@@ -72,15 +72,19 @@ def angles_by_hand(anchors: list[tuple[Any, Any]], links: Any) -> list[Any]:
 
 
 def joints_by_hand(anchors: Any, links: Any) -> np.ndarray:
-    """Nose-up joints (..., 2 N - 1) from anchors (..., N, 2) by the law of cosines; NaN out of reach."""
+    """Nose-up joints (..., 2 N - 1) from anchors (..., N, 2) by the law of cosines; NaN out of reach by more than
+    rounding."""
     anchors, links = np.asarray(anchors, float), np.asarray(links, float)
     a, b = links[0::2], links[1::2]
     x, z = np.moveaxis(np.diff(anchors, axis=-2), -1, 0)
     square = x * x + z * z
-    length = np.sqrt(square)
-    with np.errstate(invalid="ignore"):
-        rear = np.arctan2(z, x) + np.arccos((a * a + square - b * b) / (2 * a * length))
-        front = np.arctan2(z, x) - np.arccos((b * b + square - a * a) / (2 * b * length))
-    angles = np.stack([rear, front], axis=-1).reshape(*x.shape[:-1], -1)
+
+    def angle(own: Any, other: Any) -> Any:
+        cosine = (own * own + square - other * other) / (2 * own * np.sqrt(square))
+        known = np.abs(cosine) <= 1.0 + 1e-12
+        return np.where(known, np.arccos(np.where(known, np.clip(cosine, -1.0, 1.0), 0.0)), np.nan)
+
+    alpha = np.arctan2(z, x)
+    angles = np.stack([alpha + angle(a, b), alpha - angle(b, a)], axis=-1).reshape(*x.shape[:-1], -1)
     level = np.zeros((*angles.shape[:-1], 1))
     return np.diff(np.concatenate([level, angles, level], axis=-1), axis=-1)
