@@ -18,7 +18,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bodyplan import curves, export, fitting, gaits, ground, rates, spatial
+    from bodyplan import curves, export, fitting, gaits, ground, rates, solve, spatial
     from bodyplan.check import Report, check
     from bodyplan.curves import BodyCurve, ConcertinaCurve, Sampled, Segments, Serpenoid, SinusLift, Spiral
     from bodyplan.errors import (
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     )
     from bodyplan.show import show
     from bodyplan.simulate import Friction, Trial, simulate
+    from bodyplan.solve import stability
 
 __version__ = "0.1.0"
 
@@ -113,15 +114,16 @@ _FACE = {
     "Friction": "simulate",
     "Trial": "simulate",
     "simulate": "simulate",
+    "stability": "solve",
     "show": "show",
     "load": "export",
     "save": "export",
     "load_mission": "missions",
     "run": "job",
 }
-_MODULES = ("curves", "errors", "export", "fitting", "gaits", "ground", "rates", "robot", "spatial", "units")
+_MODULES = ("curves", "errors", "export", "fitting", "gaits", "ground", "rates", "robot", "solve", "spatial", "units")
 
-__all__ = [*sorted(_FACE), "curves", "export", "fitting", "gaits", "ground", "rates", "spatial"]
+__all__ = [*sorted(_FACE), "curves", "export", "fitting", "gaits", "ground", "rates", "solve", "spatial"]
 
 
 class _Face(ModuleType):

@@ -31,6 +31,9 @@ class Status(StrEnum):
     ABOVE_CEILING = "above_ceiling"
     BELOW_FLOOR = "below_floor"
     NOT_CONVERGED = "not_converged"
+    CONFLICT = "conflict"  # what is commanded contradicts itself
+    INFEASIBLE = "infeasible"  # what is commanded cannot be done within the limits
+    DAMPED = "damped"  # near a singularity, where damping misses what is commanded
     DIVERGED = "diverged"  # the physics left the realm of finite numbers
 
 

@@ -1,0 +1,199 @@
+"""Inequalities on rates: joint limits and rates, height of the body, reach of the feet, over a short time ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bodyplan.arrays import Array, number
+from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.robot.elements import Element
+from bodyplan.robot.model import Robot
+from bodyplan.solve.components import Component
+from bodyplan.solve.partitions import Partition
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What resolved rates must respect: every position is held within its bounds ``horizon`` s ahead.
+
+    A position p with rate dp may move at (low - p) / horizon <= dp <= (high - p) / horizon: the velocity damper of
+    Faverjon and Tournassoud (1987) that lets it approach a bound no faster than exponentially, with that time constant.
+    Steps up to ``horizon`` long cannot cross a bound; beyond it, a position has to come back.
+
+    * ``joints``: the limits of the robot's joints; ``rates``: their largest rates (True: those that the robot has).
+    * ``height`` (low, high) m: of the base's origin in the world.
+    * ``reach`` (low, high) m: distance of a foot from where its leg begins to move (the axis of the first joint of its
+      chain); one pair for all feet that are ends of chains, or pairs by foot. A highest reach a bit below the length of
+      the stretched leg keeps its knee from straightening.
+    * ``components`` by name: largest rate by size, or (low, high), m/s or rad/s, of any foot's, body's or joint's rate
+      in the partition's axes.
+
+    A bound may be infinite. Raises InputError for bounds that are not (low, high) with low < high, a horizon that is
+    not > 0.
+    """
+
+    horizon: float = 0.1
+    joints: bool = True
+    rates: bool = True
+    height: Pair | None = None
+    reach: Pair | Mapping[str, Pair] | None = None
+    components: Mapping[str, float | Pair] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        number(self.horizon, "Limits.horizon", above=0.0)
+        for name in ("joints", "rates"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(f"Limits.{name}: must be True or False, got {getattr(self, name)!r}.")
+        if self.height is not None:
+            object.__setattr__(self, "height", _pair(self.height, "Limits.height"))
+        if isinstance(self.reach, Mapping):
+            reach: Any = {str(k): _pair(v, f"Limits.reach[{k!r}]") for k, v in self.reach.items()}
+            object.__setattr__(self, "reach", reach)
+        elif self.reach is not None:
+            object.__setattr__(self, "reach", _pair(self.reach, "Limits.reach"))
+        if not isinstance(self.components, Mapping):
+            raise InputError(f"Limits.components: expected a mapping from names to rates, got {self.components!r}.")
+        rates = {str(k): _rate(v, f"Limits.components[{k!r}]") for k, v in self.components.items()}
+        object.__setattr__(self, "components", rates)
+
+
+class Inequalities(NamedTuple):
+    """L rows ``C X + D Y <= h`` with their ``labels``: C (..., L, x), D (..., L, y), h (..., L)."""
+
+    labels: tuple[str, ...]
+    C: Array
+    D: Array
+    h: Array
+
+
+def inequalities(partition: Partition, limits: Limits) -> Inequalities:
+    """The rows of ``limits`` for a partition. UnknownNameError for a foot or component that it does not have,
+    InputError for the reach of a foot whose leg has no joint."""
+    rows = _Rows(partition)
+    robot, q, horizon = partition.model.robot, partition.model.q, limits.horizon
+    for k, name in enumerate(robot.joints):
+        line = {Component("joint", k): np.ones(())}
+        if limits.joints:
+            low, high = robot.limits[k]
+            rows.add(f"limit of {name}", line, (low - q[..., k]) / horizon, (high - q[..., k]) / horizon)
+        if limits.rates:
+            rows.add(f"rate of {name}", line, -robot.rates[k], robot.rates[k])
+    if limits.height is not None:
+        z = partition.model.base[..., 2]
+        # z of the world is the last row of the base's axes
+        upward = partition.model.body_rotation[..., 2:, :] @ partition.body_jacobian[..., :3, :]
+        line = {Component("body", k): upward[..., 0, k] for k in range(6)}
+        low, high = limits.height
+        rows.add("height", line, (low - z) / horizon, (high - z) / horizon)
+    for foot, (low, high) in _reaches(partition, limits.reach).items():
+        r, slope = _reach(partition, foot)
+        line = {Component("joint", k): slope[..., k] for k in range(robot.n)}
+        name = partition.model.feet[foot]
+        rows.add(f"reach of {name}", line, (low - r) / horizon, (high - r) / horizon)
+    for name, bounds in limits.components.items():
+        low, high = _rate(bounds, name)
+        for component in partition.names.find(name, "Limits.components"):
+            rows.add(f"rate of {partition.names.name(component)}", {component: np.ones(())}, low, high)
+    return rows.done()
+
+
+class _Rows:
+    """Collects inequalities; a bound that is infinite makes none."""
+
+    def __init__(self, partition: Partition) -> None:
+        self.partition = partition
+        self.labels: list[str] = []
+        self.lines: list[tuple[Mapping[Component, Array], float, Any]] = []
+
+    def add(self, label: str, line: Mapping[Component, Array], low: Any, high: Any) -> None:
+        for side, sign, bound in (("lower", -1.0, low), ("upper", 1.0, high)):
+            if np.all(np.isfinite(bound)):
+                self.labels.append(f"{side} {label}")
+                self.lines.append((line, sign, sign * np.asarray(bound)))
+
+    def done(self) -> Inequalities:
+        shape, size = self.partition.shape, len(self.labels)
+        C = np.zeros((*shape, size, len(self.partition.X)))
+        D = np.zeros((*shape, size, len(self.partition.Y)))
+        h = np.empty((*shape, size))
+        for row, (line, sign, bound) in enumerate(self.lines):
+            h[..., row] = bound
+            for component, factor in line.items():
+                unknown, i = self.partition.place(component)
+                (C if unknown else D)[..., row, i] = sign * factor
+        return Inequalities(tuple(self.labels), C, D, h)
+
+
+def leg_root(robot: Robot, frame: int) -> int:
+    """Index of the frame whose z is the axis of the first joint on the way from the start of the chain to ``frame``.
+    InputError where no joint of the chain moves that frame."""
+    first = 1
+    for chain in robot.chains:
+        last = first + len(chain.elements) - 1
+        if first <= frame <= last:
+            root = robot.frame_index(chain.parent)
+            for i in range(first, frame + 1):
+                if _driven(robot.elements[i - 1]):
+                    return root
+                root = i
+            break
+        first = last + 1
+    raise InputError(f"Limits.reach: no joint of its chain moves {robot.frames[frame]!r}.")
+
+
+def _driven(element: Element) -> bool:
+    return any(not isinstance(getattr(element, variable), float) for variable in element.VARIABLES)
+
+
+def _reaches(partition: Partition, reach: Any) -> dict[int, Pair]:
+    if reach is None:
+        return {}
+    model = partition.model
+    if not isinstance(reach, Mapping):
+        return {i: reach for i, foot in enumerate(model.targets) if foot.frame in model.robot.ends}
+    out = {}
+    for name, pair in reach.items():
+        components = partition.names.find(name, "Limits.reach")
+        if len(components) != 6 or components[0].kind != "foot":
+            raise UnknownNameError("foot", name, model.feet, where="Limits.reach")
+        out[components[0].number // 6] = pair
+    return out
+
+
+def _reach(partition: Partition, foot: int) -> tuple[Array, Array]:
+    """Distance r (...) m of a foot from the root of its leg, and dr/dq (..., n)."""
+    model = partition.model
+    robot = model.robot
+    root = robot.frames[leg_root(robot, model.targets[foot].frame)]
+    start = robot.ends_and_jacobians(model.q, frames=(root,))
+    end_R, root_R = model.reach.rotations[..., foot, :, :], start.rotations[..., 0, :, :]
+    end = model.reach.positions[..., foot, :] + end_R @ np.array(model.targets[foot].start)
+    way = end - start.positions[..., 0, :]
+    r = np.linalg.norm(way, axis=-1)
+    # the rate of the way in base axes, for a base at rest; at r = 0 no direction is longer
+    velocity = end_R @ model.Q[..., 6 * foot : 6 * foot + 3, :] - root_R @ start.stacked()[..., :3, :]
+    unit = way / np.where(r > 0.0, r, 1.0)[..., None]
+    return r, np.asarray((unit[..., None, :] @ velocity)[..., 0, :])
+
+
+def _pair(value: Any, field_name: str) -> Pair:
+    try:
+        low, high = (float(v) for v in value)
+    except (TypeError, ValueError):
+        low, high = 1.0, 0.0
+    if not low < high:
+        raise InputError(f"{field_name}: must be (low, high) with low < high, got {value!r}.")
+    return low, high
+
+
+def _rate(value: Any, field_name: str) -> Pair:
+    if isinstance(value, (tuple, list)):
+        return _pair(value, field_name)
+    most = number(value, field_name, above=0.0)
+    return -most, most

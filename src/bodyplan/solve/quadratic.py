@@ -1,0 +1,81 @@
+"""The smallest z with A z <= h, by Clarabel; which rows contradict each other where there is none."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray
+from bodyplan.errors import MissingExtraError
+
+#: how much a row may be exceeded by rounding, rows of length 1
+ROUNDING = 1e-10
+#: cost of |z|^2 beside that of exceeding rows: enough to make the least excess one point
+SMALL = 1e-6
+#: multiplier from which on a row takes part in a conflict; a row that is exceeded has 1
+TAKES_PART = 1e-3
+
+
+class Nearest(NamedTuple):
+    """``z`` (k,); ``feasible``: whether A z <= h; ``pushing`` (L,): rows that hold z back or contradict each other;
+    ``solved``: False where the solver gave up."""
+
+    z: Array
+    feasible: bool
+    pushing: BoolArray
+    solved: bool = True
+
+
+def nearest(A: Array, h: Array) -> Nearest:
+    """Minimise |z|^2 with A z <= h, A (L, k), h (L,). Where no z does, the one that exceeds the rows by the least sum,
+    each row of A scaled to length 1. Raises MissingExtraError without Clarabel."""
+    length = np.linalg.norm(A, axis=-1)
+    # a row in which nothing can move only says whether it holds
+    moves = length > 1e-12 * length.max(initial=0.0)
+    scaled = np.where(moves, length, 1.0)
+    unit, bound = np.where(moves[:, None], A, 0.0) / scaled[:, None], h / scaled
+    stuck = ~moves & (bound < -ROUNDING)
+    L, k = A.shape
+    if not stuck.any():
+        status, z, multipliers = _clarabel(np.eye(k), np.zeros(k), unit[moves], bound[moves])
+        if status == "Solved":
+            pushing = np.zeros(L, dtype=bool)
+            # of a row that pushes the slack vanishes, of any other the multiplier
+            pushing[moves] = multipliers > bound[moves] - unit[moves] @ z
+            return Nearest(_polished(unit, bound, pushing, z), True, pushing)
+    weight = np.concatenate([np.full(k, SMALL), np.zeros(L)])
+    rows = np.block([[unit, -np.eye(L)], [np.zeros((L, k)), -np.eye(L)]])
+    cost = np.concatenate([np.zeros(k), np.ones(L)])
+    status, both, multipliers = _clarabel(np.diag(weight), cost, rows, np.concatenate([bound, np.zeros(L)]))
+    return Nearest(both[:k], False, multipliers[:L] > TAKES_PART, status == "Solved")
+
+
+def _polished(A: Array, h: Array, pushing: BoolArray, z: Array) -> Array:
+    """z with the rows that push met exactly, where that is a solution: an interior point method stops a little inside
+    or outside of them."""
+    exact = np.asarray(np.linalg.lstsq(A[pushing], h[pushing], rcond=None)[0])
+    return exact if np.all(A @ exact <= h + ROUNDING) and np.abs(exact - z).max(initial=0.0) < 1e-5 else z
+
+
+def _clarabel(P: Array, q: Array, A: Array, h: Array) -> tuple[str, Array, Array]:
+    """(status, z, multipliers) of: minimise z P z / 2 + q z with A z <= h."""
+    clarabel = library()
+    from scipy.sparse import csc_array
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
+    cones = [clarabel.NonnegativeConeT(len(h))]
+    solution = clarabel.DefaultSolver(csc_array(P), q, csc_array(A), h, cones, settings).solve()
+    status = "Solved" if str(solution.status) in ("Solved", "AlmostSolved") else str(solution.status)
+    return status, np.array(solution.x), np.array(solution.z)
+
+
+def library() -> Any:
+    """The ``clarabel`` module, or MissingExtraError saying how to install it."""
+    try:
+        import clarabel
+    except ImportError as error:
+        raise MissingExtraError("clarabel", "solve", "resolving rates within limits") from error
+    return clarabel
