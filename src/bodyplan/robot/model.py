@@ -212,8 +212,7 @@ class Robot:
         in the axes of that end frame, V_base in those of the base. P = D_n ... D_1 per chain (the paper
         prints the opposite order). A chain that hangs on another has the columns of its parent's joints too.
         """
-        at = self.ends_and_jacobians(q)
-        return at.carried(), at.stacked()
+        return self.ends_and_jacobians(q).velocity_model()
 
     def jacobian(self, q: ArrayLike | Mapping[str, ArrayLike], frame: str, *, reference: str = "body") -> Array:
         """(..., 6, n) twist (v, omega) of ``frame`` per unit joint rate, for a base at rest.

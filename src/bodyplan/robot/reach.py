@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
 from numpy import empty, ndarray
 from numpy.typing import ArrayLike
 
@@ -13,8 +12,10 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError
 from bodyplan.robot.batch import FLOAT, NO_POSE, SHARED_FROM, flatten, joint_array, run
 from bodyplan.robot.jacobian_kernel import jacobian_kernel
+from bodyplan.robot.spread_kernel import spread_kernel
 from bodyplan.robot.tables import Paths
-from bodyplan.spatial.twists import adjoint_inverse
+
+NOTHING = empty(0)
 
 
 class Reach:
@@ -51,18 +52,25 @@ class Reach:
 
     def stacked(self) -> Array:
         """(..., 6 C, n): the Jacobians of all targets over each other, a column for every joint (Q)."""
-        C = len(self.offsets) - 1
-        out = np.zeros((*self._batch, 6 * C, self._paths.one[0]))
-        for c in range(C):
-            span = slice(self.offsets[c], self.offsets[c + 1])
-            out[..., 6 * c : 6 * c + 6, self.joints[span]] = self.twists[..., span, :].swapaxes(-1, -2)
-        return out
+        return self._spread(NOTHING, self._empty(self._paths.one[0]))[1]
 
     def carried(self) -> Array:
         """(..., 6 C, 6): twists of targets rigidly attached to the base per unit base twist (P), for a base
         at the identity pose."""
-        each = adjoint_inverse(self.positions, self.rotations)
-        return each.reshape(*each.shape[:-3], 6 * each.shape[-3], 6)
+        return self._spread(self._empty(6), NOTHING)[0]
+
+    def velocity_model(self) -> tuple[Array, Array]:
+        """(P, Q) of :meth:`carried` and :meth:`stacked` in one pass."""
+        return self._spread(self._empty(6), self._empty(self._paths.one[0]))
+
+    def _empty(self, columns: int) -> Array:
+        return empty((*self._batch, 6 * self._paths.shapes[0][0], columns))
+
+    def _spread(self, P: Array, Q: Array) -> tuple[Array, Array]:
+        paths = self._paths
+        arrays = self.positions, self.rotations, self.twists, paths.offsets, paths.joints
+        spread_kernel(math.prod(self._batch), paths.one[0], *arrays, P, Q)
+        return P, Q
 
     def __repr__(self) -> str:
         return f"Reach(batch={self._batch}, targets={len(self.offsets) - 1}, columns={len(self.joints)})"
