@@ -18,7 +18,7 @@ from bodyplan.robot.elements import Joint, Variable, WheelRadius
 from bodyplan.units import SI_UNITS, to_si
 
 MAX_TEXT = 200
-_EXAMPLE = {"angle": "'90 deg'", "length": "'25 mm'"}
+_EXAMPLE = {"angle": "an angle such as '90 deg'", "length": "a length such as '25 mm'"}
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"([+-]?{_NUMBER})\s*([A-Za-zµ°][A-Za-zµ°0-9/*^ ]{{0,30}})?")
 _NAME = r"[^\W\d][\w.:\-]*"
@@ -65,7 +65,7 @@ def variable(value: Any, dimension: str, where: str, unit: str | None = None) ->
         found = _JOINT.fullmatch(term)
         if not found or joint is not None:
             raise InputError(
-                f"{where}: {value!r} is neither a {dimension} such as {_EXAMPLE[dimension]} nor one joint "
+                f"{where}: {value!r} is neither {_EXAMPLE[dimension]} nor one joint "
                 "with a factor and an offset such as '0.5*knee' or 'knee + 0.1' (spaces around + and -)."
             )
         scale = sign * (-1.0 if found["minus"] else 1.0) * float(found["before"] or 1.0)
