@@ -34,7 +34,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False)
 class Demands:
-    """``links`` (2 N - 2,) m; ``ceiling`` m above the lower anchor of its leg for every elbow; ``limits`` (2 N - 1, 2)
+    """``links`` (2 N - 2,) m; ``ceiling`` m above the lower anchor of its leg for every joint; ``limits`` (2 N - 1, 2)
     rad and ``rates`` (2 N - 1,) rad/s of the joints, nose-up, closing one last; ``nearest`` m between two neighbouring
     anchors; ``parts`` that must be clear of each other behind and ahead of joints, the first of them ``tail`` m from
     the tail end (None: they are thin); ``balance`` with the least support ``margin`` m along the way (None: not asked
@@ -81,8 +81,11 @@ class Demands:
         }
         elbows = state.elbows(self.links)
         if np.isfinite(self.ceiling):
-            low = np.minimum(state.anchors[..., :-1, 1], state.anchors[..., 1:, 1])
-            out[Status.ABOVE_CEILING] = (elbows[..., 1] - low - self.ceiling) / size
+            # a lifted anchor may be higher than the elbows beside it
+            rear, front = state.anchors[..., :-1, 1], state.anchors[..., 1:, 1]
+            high = np.concatenate([elbows[..., 1], np.maximum(rear, front)], axis=-1)
+            low = np.minimum(rear, front)
+            out[Status.ABOVE_CEILING] = (high - np.concatenate([low, low], axis=-1) - self.ceiling) / size
         if len(self.limits):
             q = bends(state.angles)
             beyond = np.concatenate([self.limits[:, 0] - q, q - self.limits[:, 1]], axis=-1) / np.pi
@@ -118,9 +121,11 @@ class Demands:
             places = []
             for status, values in beyond.items():
                 filled = np.where(np.isfinite(values), values, -np.inf)  # a leg out of reach has no elbow
-                along = filled.max(axis=-1, initial=-np.inf)
-                found[status] = np.maximum(found.get(status, -np.inf), along.max(axis=1))
-                places.append(np.take_along_axis(tau, along.argmax(axis=1)[:, None], axis=1))
+                # elbows and lifted anchors are highest at different places
+                for part in np.split(filled, 2, axis=-1) if status == Status.ABOVE_CEILING else [filled]:
+                    along = part.max(axis=-1, initial=-np.inf)
+                    found[status] = np.maximum(found.get(status, -np.inf), along.max(axis=1))
+                    places.append(np.take_along_axis(tau, along.argmax(axis=1)[:, None], axis=1))
             around = np.concatenate(places, axis=1)
             offsets = step * np.linspace(-1.0, 1.0, FINE)
             tau = np.clip((around[..., None] + offsets).reshape(count, -1), 0.0, 1.0)
