@@ -11,6 +11,7 @@ import numpy as np
 from bodyplan.errors import MissingExtraError
 from bodyplan.show.following_page import following_figure
 from bodyplan.show.grids import grid_figure
+from bodyplan.show.inching_figures import footholds, side_views
 from bodyplan.show.keyframes import body_keyframes
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
@@ -59,6 +60,8 @@ def figures(outcome: Outcome, playback: Playback) -> dict[str, Figure]:
         "slip_by_stage": slip_by_stage,
         "torque": torque,
         "curve_and_mechanism": lambda o, p: following_figure(p.following, new_figure),
+        "side_views": lambda o, p: side_views(p.inching, new_figure),
+        "footholds": lambda o, p: footholds(p.inching, new_figure),
         "contacts": lambda o, p: schedule_figure(p, new_figure),
         "grid": lambda o, p: grid_figure(o.grid, new_figure),
     }

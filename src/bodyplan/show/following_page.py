@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ from bodyplan.show.fitted_figures import draw_overlay, draw_turning
 from bodyplan.show.following import Following
 from bodyplan.show.layout import layout, line
 from bodyplan.show.series import EXECUTED, PLANNED
-from bodyplan.show.text import esc, figure, percent, plot, section, table
+from bodyplan.show.text import esc, figure, percent, picture, plot, section, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +34,8 @@ def following_section(found: Following | None, pictures: Mapping[str, str]) -> s
     head = ("time", "E_nm", "its quadrature error", "largest distance", "of the body’s length")
     out = f"<p>{in_words(found)}</p>" + table(head, rows, numbers=(0, 1, 2, 3, 4))
     if "curve_and_mechanism" in pictures:
-        out += "<h3>At key times</h3>" + _picture(pictures["curve_and_mechanism"])
+        alt = "Curve and mechanism at key times, and their turning along the body"
+        out += "<h3>At key times</h3>" + picture(pictures["curve_and_mechanism"], alt)
     out += plot("overlay", f"Curve and mechanism at {figure(float(found.key_times[0]), 's', 3)}, lengths true.")
     out += plot(
         "turning",
@@ -55,14 +55,6 @@ def in_words(found: Following) -> str:
         f"Over the {when} the mean distance between mechanism and curve, as a share of the body’s length (E_nm), is "
         f"<b>{between}</b>. The largest distance is <b>{figure(far, 'm')}</b> ({percent(far / found.length)} of the "
         f"body), at {figure(float(found.t[worst]), 's', 3)}."
-    )
-
-
-def _picture(svg: str) -> str:
-    data = base64.b64encode(svg.encode("utf-8")).decode("ascii")
-    return (
-        '<div class="scroll picture" tabindex="0"><img alt="Curve and mechanism at key times, and their turning along '
-        f'the body" src="data:image/svg+xml;base64,{data}"></div>'
     )
 
 

@@ -8,7 +8,11 @@ import numpy as np
 
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
+from bodyplan.show.remarks import plan_warnings
 from bodyplan.show.text import counted, esc, figure, listed, percent, plain, unit_of, words
+
+#: failed checks that are told beside the verdict
+TOLD = 3
 
 
 def head(outcome: Outcome, playback: Playback) -> str:
@@ -16,8 +20,15 @@ def head(outcome: Outcome, playback: Playback) -> str:
     about = "".join(f'<p class="about">{esc(part)}</p>' for part in outcome.about.split("\n\n") if part.strip())
     return (
         f'<header><p class="kicker">bodyplan report</p><h1>{esc(outcome.title)}</h1>{about}'
-        f"<p>{sentence(outcome, playback)}</p></header>\n{verdict(outcome)}\n{tiles(outcome, playback)}"
+        f"<p>{sentence(outcome, playback)}</p></header>\n{verdict(outcome)}\n{_missed(outcome)}"
+        f"{tiles(outcome, playback)}"
     )
+
+
+def _missed(outcome: Outcome) -> str:
+    """What the plan says that nobody may miss: why it stops, warnings."""
+    items = [f"<li>{esc(text)}</li>" for text in plan_warnings(outcome.motion)]
+    return f'<div class="warning"><b>The plan says</b><ul>{"".join(items)}</ul></div>\n' if items else ""
 
 
 def sentence(outcome: Outcome, playback: Playback) -> str:
@@ -54,8 +65,15 @@ def _ground(ground: Any) -> str:
             shown.append(f"{words(name)} {figure(float(value), unit_of(name))}")
         elif isinstance(value, str) and len(value) <= 80:
             shown.append(f"{words(name)} {value}")
+        elif _steps(value):
+            shown.append(f"{words(name)} with {counted(len(value) - 1, 'step')}")
     article = "an" if kind[:1] in "aeiou" else "a"
     return f"{article} <b>{esc(kind)}</b>{f' ({esc(listed(shown))})' if shown else ''}"
+
+
+def _steps(value: Any) -> bool:
+    """True for a list of pairs (x from which on, level), as floors and ceilings have."""
+    return isinstance(value, list) and all(isinstance(pair, list) and len(pair) == 2 for pair in value)
 
 
 def verdict(outcome: Outcome) -> str:
@@ -73,10 +91,14 @@ def verdict(outcome: Outcome) -> str:
             "good",
         )
     sign = "✗" if failed else "✓"
+    told = [f"{line.what}{': ' if line.detail else ''}{line.detail}" for line in outcome.report.failures[:TOLD]]
+    more = failed - len(told)
+    told += [f"and {more} more"] if more > 0 else []
+    why = "".join(f"<small>{esc(text)}</small>" for text in told)
     physics, tone = _physics(outcome)
     return (
         f'<section class="verdict" aria-label="Verdict"><p class="{mood}"><span aria-hidden="true">{sign}'
-        f'</span> {checks}</p><p class="{tone}">{physics}</p></section>'
+        f'</span> {checks}{why}</p><p class="{tone}">{physics}</p></section>'
     )
 
 

@@ -12,6 +12,7 @@ from bodyplan.motion import Motion
 from bodyplan.robot.masses import center_from_poses
 from bodyplan.robot.model import Robot
 from bodyplan.show.following import Following
+from bodyplan.show.inching import Inching, NotShown
 from bodyplan.simulate.loop import Timing
 from bodyplan.simulate.measure import at, directions
 from bodyplan.simulate.reference import Reference
@@ -88,6 +89,11 @@ class Playback:
     def following(self) -> Following | None:
         """How the mechanism follows its curve over a cycle; None for a gait that follows none."""
         return Following.of(self.motion, self.span, self.period is not None)
+
+    @cached_property
+    def inching(self) -> Inching | NotShown | None:
+        """How the body stands on its anchors; None for a gait that has none."""
+        return Inching.of(self.motion, self.span, self.period is not None)
 
     def advance(self, centre: Array) -> Array:
         """How far (k,) m centres of mass (k, 3) at the first k times have come along the planned direction

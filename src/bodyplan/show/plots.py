@@ -11,6 +11,7 @@ from bodyplan.arrays import Array
 from bodyplan.show.figures import STRIPES, peak_and_rms
 from bodyplan.show.following_page import following_plots
 from bodyplan.show.grids import grid_plot
+from bodyplan.show.inching_plots import inching_plots
 from bodyplan.show.layout import label, layout, line
 from bodyplan.show.outcome import Outcome, five_point_gaps, five_point_rates
 from bodyplan.show.playback import Playback
@@ -52,6 +53,7 @@ def plots(outcome: Outcome, playback: Playback) -> dict[str, Plot]:
         "contacts": schedule_plot(playback),
         "grid": grid_plot(outcome.grid),
         **following_plots(playback.following),
+        **inching_plots(outcome, playback),
     }
     for group in joint_groups(playback.motion):
         made[f"angles_{group.kind}"] = heat_map(playback, group, playback.motion.q, f"joint {group.kind}", group.unit)

@@ -1,4 +1,4 @@
-"""Warnings of a trial as a reader wants them: those of many joints on one line."""
+"""Warnings of a plan and of a trial as a reader wants them: those of many joints on one line."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
 from bodyplan.show.text import counted, degrees, figure, listed
 from bodyplan.simulate.trial import Trial
@@ -17,6 +18,15 @@ _EFFORT = re.compile(
     r"servo of joint '(?P<joint>[^']*)' is at its effort (?P<effort>\S+) for (?P<part>\S+) % of the time"
 )
 _LIMIT = re.compile(r"joint '(?P<joint>[^']*)' is pushed against its limit")
+
+
+#: how notes of a plan begin that nobody may miss; the first of them is left out where they are told
+WARNING, STOPS = "Warning: ", "Stops at "
+
+
+def plan_warnings(motion: Motion) -> list[str]:
+    """Notes of a plan that nobody may miss: warnings, and why it stops before its time."""
+    return [note.removeprefix(WARNING) for note in motion.notes if note.startswith((WARNING, STOPS))]
 
 
 def gathered(trial: Trial, robot: Robot) -> list[str]:

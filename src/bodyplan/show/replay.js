@@ -191,20 +191,20 @@
       parts.push({ depth: dot(camera.toward, p[0]) - 0.5 * data.reach, draw: (ctx) => polygon(ctx, p, color, color) });
     }
   }
-  // a box is in front of the robot when the viewer is on the other side of the face that the robot is outside of
+  // a box can hide the robot unless a face that the robot is outside of looks at the viewer
   function boxesInFront(centre) {
-    const best = {};
+    const front = {};
     for (const face of data.ground.faces) {
-      const distance = dot(face.normal, centre) - dot(face.normal, face.corners[0]);
-      if (!best[face.box] || distance > best[face.box].distance)
-        best[face.box] = { distance, front: dot(face.normal, camera.toward) < -1e-6 };
+      const outside = dot(face.normal, centre) - dot(face.normal, face.corners[0]) > 0;
+      if (!(face.box in front)) front[face.box] = true;
+      if (outside && dot(face.normal, camera.toward) > -1e-6) front[face.box] = false;
     }
-    return best;
+    return front;
   }
   function drawFaces(front, inFront) {
     const FILL = { wall: "127,143,158", floor: "205,209,203", ceiling: "150,160,170" };
     for (const face of data.ground.faces) {
-      if (inFront[face.box].front !== front || dot(face.normal, camera.toward) <= 1e-6) continue;
+      if (inFront[face.box] !== front || dot(face.normal, camera.toward) <= 1e-6) continue;
       const shade = 0.75 + 0.25 * Math.abs(face.normal[2]), alpha = front ? 0.2 : face.role === "floor" ? 0.9 : 0.42 * shade;
       polygon(context, face.corners, "rgba(" + (FILL[face.role] || FILL.wall) + "," + alpha + ")", "rgba(80,95,110," + (front ? 0.45 : 0.6) + ")");
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,13 +14,14 @@ from bodyplan.show.execution import execution
 from bodyplan.show.figures import write_figures
 from bodyplan.show.following_page import following_section
 from bodyplan.show.grids import grid_section
+from bodyplan.show.inching_page import inching_section
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.overview import head
 from bodyplan.show.playback import Playback
 from bodyplan.show.plots import plots
 from bodyplan.show.scene import scene
 from bodyplan.show.schedule import schedule_part
-from bodyplan.show.text import plot, section
+from bodyplan.show.text import picture, plot, section
 
 #: the page's own scripts, in the order in which they run
 SCRIPTS = ("pointer", "timeline", "replay", "plots")
@@ -65,6 +65,7 @@ def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
         "Replay": _replay(playback, curve=replayed["path"] is not None),
         "Checks": sections.checks(outcome),
         "Planned and executed": execution(outcome, playback),
+        "On its anchors": inching_section(outcome, playback, drawn),
         "Comparison": sections.comparison(outcome),
         "Beside the paper": sections.beside_the_paper(outcome),
         "Grid": grid_section(outcome.grid, outcome.name),
@@ -120,12 +121,9 @@ plays, arrow keys step. Add <code>#t=3.2</code> to the address to open the repor
 def _curves(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
     out = ""
     if "body_keyframes" in drawn:
-        picture = base64.b64encode(drawn["body_keyframes"].encode("utf-8")).decode("ascii")
         what = "planned and executed body" if outcome.trial is not None and outcome.trial.ok else "planned body"
-        out += (
-            '<h3>The body at key frames</h3><div class="scroll picture" tabindex="0"><img alt="The '
-            f'{what} at even times of one cycle" src="data:image/svg+xml;base64,{picture}"></div>'
-        )
+        alt = f"The {what} at even times of one cycle"
+        out += "<h3>The body at key frames</h3>" + picture(drawn["body_keyframes"], alt)
     for kind in ("angle", "length"):
         if kind in outcome.motion.robot.kinds:
             name = "angles" if kind == "angle" else "lengths"

@@ -14,6 +14,9 @@ from bodyplan.show.playback import Playback
 from bodyplan.show.shapes import arc_bones, bones, extent, scenery, thickness
 from bodyplan.show.stages import few, lanes, shades, stages_of
 
+#: radius of a bar that holds a ball, of the ball's
+AXLE = 0.3
+
 
 def scene(playback: Playback) -> dict[str, Any]:
     """The replay's data; arrays are base64 of little-endian float32."""
@@ -68,7 +71,7 @@ def _track(playback: Playback, poses: Array, centre: Array) -> dict[str, Any]:
 
 
 def _shapes(robot: Robot, place: dict[int, int]) -> list[dict[str, Any]]:
-    return [
+    shapes: list[dict[str, Any]] = [
         {
             "body": place[robot.frame_index(c.frame)],
             "kind": c.shape,
@@ -79,6 +82,13 @@ def _shapes(robot: Robot, place: dict[int, int]) -> list[dict[str, Any]]:
         }
         for c in robot.contacts
     ]
+    # balls beside their frame, as feet are, would hang in the air: a bar joins them to it
+    bars = [
+        {**shape, "kind": "capsule", "radius": AXLE * shape["radius"], "end": [0.0, 0.0, 0.0]}
+        for shape in shapes
+        if shape["kind"] == "sphere" and float(np.linalg.norm(shape["start"])) > 2.0 * shape["radius"]
+    ]
+    return [*shapes, *bars]
 
 
 def _ground(playback: Playback, low: Array, high: Array) -> dict[str, Any]:

@@ -97,6 +97,11 @@ def _compared(other: Comparison, mine: bool, slips: bool, paced: bool) -> tuple[
     )
 
 
+def _digits(printed: float) -> int:
+    """Significant digits of a printed number, the zeros of a whole one included; three at least."""
+    return max(3, len(f"{abs(printed):.15g}".partition("e")[0].replace(".", "").lstrip("0")))
+
+
 def beside_the_paper(outcome: Outcome) -> str:
     """What the paper prints, and what was found here."""
     if not outcome.paper:
@@ -104,8 +109,8 @@ def beside_the_paper(outcome: Outcome) -> str:
     rows = [
         (
             esc(row.what),
-            figure(row.printed, row.unit),
-            NOTHING if row.value is None else figure(row.value, row.unit, 3),
+            figure(row.printed, row.unit, _digits(row.printed)),
+            NOTHING if row.value is None else figure(row.value, row.unit, _digits(row.printed)),
             f"<code>{esc(row.ours)}</code>" + (f" ({esc(row.problem)})" if row.problem else ""),
             esc(row.source),
         )

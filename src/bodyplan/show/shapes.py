@@ -25,6 +25,8 @@ FACES = (
 )
 #: most samples along a side of a height field in a picture
 MOST_SIDE = 56
+#: thickness of a ceiling in a picture, of the height of what is under it
+SLAB = 0.35
 
 
 def bones(robot: Robot) -> list[tuple[int, int]]:
@@ -164,11 +166,16 @@ def scenery(ground: Ground, low: Array, high: Array) -> Scenery:
     below, above = low - near - 0.1 * up, high + near + up
     # what of a wall is under a plane floor would only be drawn over it
     foot = np.maximum(below, [-np.inf, -np.inf, min((float(p[:, 2].min()) for p in planes), default=-np.inf)])
+    boxes = [solid for solid in solids if solid.kind == "box"]
+    undersides = [s.position[2] - s.half[2] for s in boxes if s.role == "ceiling"]
+    # a thick ceiling would be most of the picture
+    lid = np.array([*above[:2], max([float(high[2]), *undersides]) + SLAB * float(high[2] - low[2])])
     faces = [
         face
-        for number, solid in enumerate(solids)
-        if solid.kind == "box"
-        for face in _box(solid, number, foot if solid.role == "wall" else below, above)
+        for number, solid in enumerate(boxes)
+        for face in _box(
+            solid, number, foot if solid.role == "wall" else below, lid if solid.role == "ceiling" else above
+        )
     ]
     fields = [_grid(s) for s in solids if s.kind == "field" and s.z is not None]
     return Scenery(tuple(planes), tuple(faces), tuple(fields))

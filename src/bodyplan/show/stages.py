@@ -3,19 +3,26 @@ meanwhile."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.show.playback import Playback
 from bodyplan.simulate.measure import at
 from bodyplan.simulate.trial import Slip, Trial
+
+if TYPE_CHECKING:
+    from bodyplan.show.playback import Playback
 
 Stage = tuple[str, float, float]
 #: stages times cycles that can be told apart in a picture
 MOST_BARS = 600
+#: rows of stages from which those of one name are taken together
+MANY_ROWS = 24
+_CYCLE = re.compile(r", cycle (\d+)$")
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,17 @@ def stages_of(playback: Playback) -> list[Stage]:
     first = playback.motion.t[0]
     rows = [(name, start - first, end - first) for name, start, end in playback.motion.stages]
     return sorted((row for row in rows if row[1] < playback.span), key=lambda row: (row[1], row[2]))
+
+
+def plain_name(name: str) -> str:
+    """The name of a stage without the number of its cycle: "tail moves" for "tail moves, cycle 3"."""
+    return _CYCLE.sub("", name)
+
+
+def cycle_number(name: str) -> int:
+    """The number of the cycle in the name of a stage, 1 where there is none."""
+    found = _CYCLE.search(name)
+    return int(found[1]) if found else 1
 
 
 def few(stages: Sequence[Stage], cycles: int) -> bool:
@@ -81,17 +99,16 @@ def lag_by_phase(playback: Playback) -> tuple[Array, Array] | None:
 def stage_rows(playback: Playback, trial: Trial | None) -> list[StageRow]:
     """Every stage in order of time, with what the trial says of it."""
     stages = stages_of(playback)
-    if trial is None:
-        return [StageRow(*stage, None, None, None) for stage in stages]
     slips: dict[int, list[Slip]] = {}
-    for slip in trial.slips:
+    for slip in () if trial is None else trial.slips:
+        assert trial is not None
         start, end = (x - trial.start_time - slip.cycle * playback.span for x in (slip.start, slip.end))
         index = _stage_of(stages, slip.stage, start, end)
         if index is None:
             stages.append((slip.stage, start, end))
             index = len(stages) - 1
         slips.setdefault(index, []).append(slip)
-    gained = lag_by_phase(playback)
+    gained = None if trial is None else lag_by_phase(playback)
     rows = []
     for i, (name, start, end) in enumerate(stages):
         along = largest = lag = None
@@ -102,7 +119,31 @@ def stage_rows(playback: Playback, trial: Trial | None) -> list[StageRow]:
             mean = np.interp([start, end], gained[0], gained[1].mean(axis=0))
             lag = float(mean[1] - mean[0])
         rows.append(StageRow(name, start, end, along, largest, lag))
-    return sorted(rows, key=lambda row: (row.start, row.end))
+    rows.sort(key=lambda row: (row.start, row.end))
+    return gathered_rows(rows) if len(rows) > MANY_ROWS else rows
+
+
+def gathered_rows(rows: Sequence[StageRow]) -> list[StageRow]:
+    """One row for all stages that have one name but for the number of their cycle, in the order of the first of each:
+    from the first to the last, sums of ``along`` and ``lag``, the largest ``largest``."""
+    groups: dict[str, list[StageRow]] = {}
+    for row in rows:
+        groups.setdefault(plain_name(row.name), []).append(row)
+    out = []
+    for name, group in groups.items():
+        along, lag = ([v for row in group if (v := getattr(row, key)) is not None] for key in ("along", "lag"))
+        far = [row.largest for row in group if row.largest is not None]
+        out.append(
+            StageRow(
+                f"{name} ({len(group)} times)" if len(group) > 1 else group[0].name,
+                group[0].start,
+                max(row.end for row in group),
+                sum(along) if along else None,
+                max(far) if far else None,
+                sum(lag) if lag else None,
+            )
+        )
+    return out
 
 
 def _stage_of(stages: Sequence[Stage], name: str, start: float, end: float) -> int | None:

@@ -3,6 +3,7 @@ show."""
 
 from __future__ import annotations
 
+import base64
 import html
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,13 +11,14 @@ from typing import Any
 
 NOTHING = "–"
 #: deg: an angle below this is rounding
-NO_ANGLE = 1e-9
+NO_ANGLE = 1e-6
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 #: last word of a quantity's name -> its SI unit, for numbers that come without one
 _UNITS = {
     **dict.fromkeys(("period", "time", "duration"), "s"),
     **dict.fromkeys(("length", "width", "height", "radius", "distance", "advance", "squeeze", "gain"), "m"),
+    **dict.fromkeys(("margin", "drive", "stride", "spread", "floor", "ceiling", "clearance"), "m"),
     **dict.fromkeys(("advance_per_cycle", "sideways_per_cycle", "wavelength", "lift"), "m"),
     **dict.fromkeys(("length_unit", "helix_pitch", "extension_in_flight"), "m"),
     **dict.fromkeys(("speed", "velocity", "speed_along_body"), "m/s"),
@@ -129,6 +131,14 @@ def folded(summary: str, content: str, *, opened: bool = False) -> str:
 def section(name: str, title: str, content: str) -> str:
     """A part of the page with a heading and a place to link to."""
     return f'<section id="{name}" class="part"><h2>{title}</h2>\n{content}</section>\n'
+
+
+def picture(svg: str, alt: str) -> str:
+    """A figure as part of the page, in a box of its own that scrolls sideways; ``alt`` says what it shows."""
+    data = base64.b64encode(svg.encode("utf-8")).decode("ascii")
+    return (
+        f'<div class="scroll picture" tabindex="0"><img alt="{esc(alt)}" src="data:image/svg+xml;base64,{data}"></div>'
+    )
 
 
 def plot(name: str, caption: str = "") -> str:
