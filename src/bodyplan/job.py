@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: fewest samples of a cycle: fewer would not show the motion, whatever dt says
 LEAST_SAMPLES = 100
+#: s: how long a gait is planned that cannot go, where nobody says
+SHORT = 2.0
 #: why a run in another process has no result: nothing but its end is known
 LOST = (
     "the process that was to run it has ended (stopped by the system, for want of memory perhaps; a script that calls "
@@ -53,7 +55,12 @@ def mission_times(mission: Mission) -> Array:
     time = mission.time
     if period is None:
         if time.stop is None:
-            raise InputError('time.stop: this gait has no cycle; say how long, for example stop = "10 s".')
+            short = np.linspace(0.0, SHORT, LEAST_SAMPLES + 1)
+            if not plan(mission.robot, mission.gait, mission.ground, short).ok:
+                return short  # a gait that cannot go has no cycle either: the plan says why
+            raise InputError(
+                'time.stop: this gait has no cycle; say how long, for example stop = "10 s" in place of cycles.'
+            )
         _bounded(time.stop / time.dt)
         steps = max(LEAST_SAMPLES, int(np.ceil(time.stop / time.dt)))
         return np.linspace(0.0, time.stop, steps + 1)

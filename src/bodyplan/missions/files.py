@@ -85,6 +85,7 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
         raise InputError(f"{where}: not valid TOML: {error}.") from error
     for item in overrides:
         override(data, item)
+    _settle_time(data, overrides)
     source = _Source(text, where, tuple(overrides))
     model = source.validate(MissionModel, data, ())
     built = {section: _build(source, model, section, data, folder) for section in SECTIONS}
@@ -109,6 +110,16 @@ def parse_mission(text: str, name: str, where: str, folder: Path | None, overrid
         model.grid,
         tuple(model.paper),
     )
+
+
+def _settle_time(data: Any, overrides: Sequence[str]) -> None:
+    """An override of how long takes the place of what the file says: stop or cycles."""
+    keys = {item.partition("=")[0].strip() for item in overrides}
+    time = data.get("time")
+    if isinstance(time, dict):
+        for mine, other in (("stop", "cycles"), ("cycles", "stop")):
+            if f"time.{mine}" in keys and f"time.{other}" not in keys:
+                time.pop(other, None)
 
 
 def _build(source: _Source, model: MissionModel, section: str, data: dict[str, Any], folder: Path | None) -> Any:

@@ -174,7 +174,7 @@ class Simulate(BaseModel):
     servo: tuple[Positive, NotNegative] | None = None
     dt: Annotated[float, *_quantity("time"), Field(gt=0, le=0.02)] = 1e-3
     settle: Annotated[float, *_quantity("time"), Field(ge=0, le=1000)] = 1.0
-    ramp: Annotated[float, *_quantity("time"), Field(ge=0, le=1000)] = 1.0
+    ramp: Annotated[float, *_quantity("time"), Field(ge=0, le=1000)] | None = None
 
 
 class Grid(BaseModel):
@@ -217,7 +217,7 @@ class MissionModel(BaseModel):
     simulate: Simulate | None = Simulate()
     compare: Annotated[list[str], Field(max_length=20)] = []
     grid: Grid | None = None
-    paper: Annotated[list[PaperRow], Field(max_length=20)] = []
+    paper: Annotated[list[PaperRow], Field(max_length=40)] = []
 
 
 def json_schema() -> dict[str, Any]:
