@@ -297,19 +297,23 @@ def _figure(value: float | None, unit: str, scale: float = 1.0, digits: int = 3)
 
 def _summary(result: Result) -> None:
     """One screen: verdict, key figures, the comparison, where the report is."""
+    from bodyplan.show.remarks import gathered, plan_warnings
+
     outcome, plan = result.outcome, result.outcome.motion.facts
     report, trial = outcome.report, outcome.trial
     say(f"\n{outcome.title}", bold=True)
     for line in report.failures:
         say(str(line), fg=typer.colors.RED)
     failed = len(report.failures)
-    warnings = [note.removeprefix("Warning: ") for note in outcome.motion.notes if note.startswith("Warning: ")]
+    warnings = plan_warnings(outcome.motion)
     typer.echo(f"  checks     {len(report.lines) - failed} passed, {failed} failed")
     if "period" in plan and "advance_per_cycle" in plan:
         typer.echo(
             f"  plan       {_figure(plan['advance_per_cycle'], 'mm', 1e3, 4)} a cycle of "
             f"{_figure(plan['period'], 's')}, {_figure(plan['speed'], 'mm/s', 1e3)}"
         )
+    elif "advance" in plan and "speed" in plan:
+        typer.echo(f"  plan       {_figure(plan['advance'], 'm')} in all, {_figure(plan['speed'], 'mm/s', 1e3)}")
     if trial is not None:
         row = outcome.itself
         if trial.ok:
@@ -323,10 +327,11 @@ def _summary(result: Result) -> None:
                 angle = "" if row.slip_angle is None else f", slip angle {math.degrees(row.slip_angle):.3g} deg"
                 own = "" if row.forward_ratio is None else f", {row.forward_ratio:.1%} along its own heading"
                 typer.echo(f"             {row.no_slip_ratio:.1%} of the speed without slip{own}{angle}")
+            if trial.lift_ratio is not None:
+                tilt = "" if trial.tilt is None else f", tilt {_figure(math.degrees(trial.tilt), 'deg')}"
+                typer.echo(f"             lifted parts rise to {trial.lift_ratio:.1%} of the plan or more{tilt}")
         else:
             say(f"  physics    {trial.status}: {trial.reason}", fg=typer.colors.RED)
-        from bodyplan.show.remarks import gathered
-
         warnings += gathered(trial, outcome.motion.robot)
     for warning in warnings[:5]:
         typer.echo(f"  warning    {warning}")
