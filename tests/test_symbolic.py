@@ -202,6 +202,7 @@ def test_arc_functions_written_out() -> None:
 
 def test_elements_of_no_robot_have_formulas() -> None:
     model = bp.silo4().symbolic()
+    assert model.D(6) == model.D("fr.knee")
     theta, a = sp.symbols("theta a")
     row = Row(theta=Joint("theta"), a=Joint("a"))
     assert model.E(row)[:, 0] == sp.Matrix([0, a, 0, 0, 0, 1])
@@ -349,6 +350,9 @@ def test_refusals() -> None:
     for call in (model.D, model.E):
         with pytest.raises(InputError, match="base"):
             call("base")
+        for row in (-1, 16, 1.5, None):
+            with pytest.raises(InputError, match="row: must be a whole number >= 0 and <= 15"):
+                call(row)
     with pytest.raises(InputError, match="reference"):
         model.jacobian("fl", reference="spatial")
     with pytest.raises(UnknownNameError, match="rows"):

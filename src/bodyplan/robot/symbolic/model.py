@@ -9,6 +9,7 @@ from typing import Any
 
 import sympy as sp
 
+from bodyplan.arrays import whole
 from bodyplan.errors import InputError
 from bodyplan.robot.elements import Arc, Element, Row
 from bodyplan.robot.formulas import cross
@@ -52,13 +53,13 @@ class SymbolicRobot:
         """(6m, n) of paper *legs* eq. (9), columns in the order of ``q``, passive joints included."""
         return sp.ImmutableMatrix.vstack(*(self._columns(frame) for frame in self.robot.ends))
 
-    def D(self, at: str | Row | Arc) -> Matrix:
+    def D(self, at: str | int | Row | Arc) -> Matrix:
         """(6, 6) of paper *legs* eq. (2): twist of the end of one element per twist of its start. ``at``: the frame
-        that the element ends in (a chain's name: its last one), or an element of any robot. UnknownNameError,
-        InputError."""
+        that the element ends in (a chain's name: its last one), the element's number in ``robot.elements`` (from 0), or
+        an element of any robot. UnknownNameError, InputError."""
         return sp.ImmutableMatrix(element_formulas(self._element(at), self._how)[0]).applyfunc(self._how.keep)
 
-    def E(self, at: str | Row | Arc) -> Matrix:
+    def E(self, at: str | int | Row | Arc) -> Matrix:
         """(6, 4) of paper *legs* eq. (3), columns theta, d, a, epsilon of a row; (6, 2), pitch and yaw, of an arc:
         twist of its end per unit rate of each variable. ``at`` as in :meth:`D`."""
         return sp.ImmutableMatrix(element_formulas(self._element(at), self._how)[1]).applyfunc(self._how.keep)
@@ -117,9 +118,11 @@ class SymbolicRobot:
             raise InputError(f"frames: expected names of frames, got {frames!r}.")
         return tuple(self.robot.frame_index(frame) for frame in frames)
 
-    def _element(self, at: str | Row | Arc) -> Element:
+    def _element(self, at: str | int | Row | Arc) -> Element:
         if isinstance(at, (Row, Arc)):
             return at
+        if not isinstance(at, str):
+            return self.robot.elements[whole(at, "row", at_most=len(self.robot.elements) - 1)]
         index = self.robot.frame_index(at)
         if index == 0:
             raise InputError("frame: no element ends in 'base'.")
