@@ -113,7 +113,9 @@ class Model:
 
     def at(self, q: ArrayLike | Mapping[str, ArrayLike], base: ArrayLike | None = None) -> Model:
         """The same robot and feet at another configuration; see :func:`model`."""
-        return Model(self.robot, *_configuration(self.robot, q, base), self.targets, self.aliases)
+        other = Model(self.robot, *_configuration(self.robot, q, base), self.targets, self.aliases)
+        other.__dict__["leg_length"] = self.leg_length
+        return other
 
     @cached_property
     def leg_length(self) -> float:

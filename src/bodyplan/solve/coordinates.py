@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError
 from bodyplan.robot.batch import base_array
-from bodyplan.spatial import matrix_from_quaternion, quaternion_from_matrix
+from bodyplan.spatial import quaternion_from_matrix
 
 #: names of the coordinates, and their units
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -37,12 +37,7 @@ def coordinates_from_pose(pose: ArrayLike) -> Array:
 def pose_from_coordinates(coordinates: ArrayLike) -> Array:
     """Poses (..., 7) of coordinates (..., 6): x, y, z in m, roll, pitch, yaw in rad."""
     c = _six(coordinates)
-    (sr, sp, sy), (cr, cp, cy) = (np.moveaxis(f(c[..., 3:]), -1, 0) for f in (np.sin, np.cos))
-    R = np.empty((*c.shape[:-1], 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -sp, cp * sr, cp * cr
-    return np.concatenate([c[..., :3], quaternion_from_matrix(R)], axis=-1)
+    return np.concatenate([c[..., :3], quaternion_from_matrix(_rotation(c))], axis=-1)
 
 
 def coordinate_jacobian(coordinates: ArrayLike) -> Array:
@@ -51,10 +46,9 @@ def coordinate_jacobian(coordinates: ArrayLike) -> Array:
     Upper left R^T; lower right the columns x, Rx^T y, (Ry Rx)^T z. Singular at pitch = +-pi/2.
     """
     c = _six(coordinates)
-    R = matrix_from_quaternion(pose_from_coordinates(c)[..., 3:])
     sr, cr, sp, cp = np.sin(c[..., 3]), np.cos(c[..., 3]), np.sin(c[..., 4]), np.cos(c[..., 4])
     J = np.zeros((*c.shape[:-1], 6, 6))
-    J[..., :3, :3] = np.swapaxes(R, -1, -2)
+    J[..., :3, :3] = np.swapaxes(_rotation(c), -1, -2)
     J[..., 3, 3] = 1.0
     J[..., 4, 4], J[..., 5, 4] = cr, -sr
     J[..., 3, 5], J[..., 4, 5], J[..., 5, 5] = -sp, sr * cp, cr * cp
@@ -66,3 +60,13 @@ def _six(coordinates: ArrayLike) -> Array:
     if c.ndim == 0 or c.shape[-1] != 6:
         raise InputError(f"coordinates: expected shape (..., 6): {', '.join(COORDINATES)}; got {c.shape}.")
     return c
+
+
+def _rotation(c: Array) -> Array:
+    """Rz(yaw) Ry(pitch) Rx(roll), (..., 3, 3)."""
+    (sr, sp, sy), (cr, cp, cy) = (np.moveaxis(f(c[..., 3:]), -1, 0) for f in (np.sin, np.cos))
+    R = np.empty((*c.shape[:-1], 3, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -sp, cp * sr, cp * cr
+    return R

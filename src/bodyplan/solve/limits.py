@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -76,57 +76,60 @@ def inequalities(partition: Partition, limits: Limits) -> Inequalities:
     """The rows of ``limits`` for a partition. UnknownNameError for a foot or component that it does not have,
     InputError for the reach of a foot whose leg has no joint."""
     rows = _Rows(partition)
-    robot, q, horizon = partition.model.robot, partition.model.q, limits.horizon
-    for k, name in enumerate(robot.joints):
-        line = {Component("joint", k): np.ones(())}
-        if limits.joints:
-            low, high = robot.limits[k]
-            rows.add(f"limit of {name}", line, (low - q[..., k]) / horizon, (high - q[..., k]) / horizon)
-        if limits.rates:
-            rows.add(f"rate of {name}", line, -robot.rates[k], robot.rates[k])
+    model, horizon = partition.model, limits.horizon
+    robot, q = model.robot, model.q
+    joints = [Component("joint", k) for k in range(robot.n)]
+    if limits.joints:
+        low, high = ((bound - q) / horizon for bound in robot.limits.T)
+        rows.add([f"limit of {name}" for name in robot.joints], joints, np.eye(robot.n), low, high)
+    if limits.rates:
+        rows.add([f"rate of {name}" for name in robot.joints], joints, np.eye(robot.n), -robot.rates, robot.rates)
     if limits.height is not None:
-        z = partition.model.base[..., 2]
         # z of the world is the last row of the base's axes
-        upward = partition.model.body_rotation[..., 2:, :] @ partition.body_jacobian[..., :3, :]
-        line = {Component("body", k): upward[..., 0, k] for k in range(6)}
-        low, high = limits.height
-        rows.add("height", line, (low - z) / horizon, (high - z) / horizon)
-    for foot, (low, high) in _reaches(partition, limits.reach).items():
+        upward = model.body_rotation[..., 2:, :] @ partition.body_jacobian[..., :3, :]
+        low, high = ((bound - model.base[..., 2:3]) / horizon for bound in limits.height)
+        rows.add(["height"], [Component("body", k) for k in range(6)], upward, low, high)
+    for foot, bounds in _reaches(partition, limits.reach).items():
         r, slope = _reach(partition, foot)
-        line = {Component("joint", k): slope[..., k] for k in range(robot.n)}
-        name = partition.model.feet[foot]
-        rows.add(f"reach of {name}", line, (low - r) / horizon, (high - r) / horizon)
-    for name, bounds in limits.components.items():
-        low, high = _rate(bounds, name)
+        low, high = ((bound - r[..., None]) / horizon for bound in bounds)
+        rows.add([f"reach of {model.feet[foot]}"], joints, slope[..., None, :], low, high)
+    for name, rate in limits.components.items():
+        low, high = (np.array([bound]) for bound in _rate(rate, name))
         for component in partition.names.find(name, "Limits.components"):
-            rows.add(f"rate of {partition.names.name(component)}", {component: np.ones(())}, low, high)
+            rows.add([f"rate of {partition.names.name(component)}"], [component], np.eye(1), low, high)
     return rows.done()
 
 
 class _Rows:
-    """Collects inequalities; a bound that is infinite makes none."""
+    """Collects inequalities low <= M v <= high on the rates v of some components; an infinite bound makes no row."""
 
     def __init__(self, partition: Partition) -> None:
         self.partition = partition
         self.labels: list[str] = []
-        self.lines: list[tuple[Mapping[Component, Array], float, Any]] = []
+        self.blocks: list[tuple[tuple[Component, ...], Array, Array]] = []
 
-    def add(self, label: str, line: Mapping[Component, Array], low: Any, high: Any) -> None:
+    def add(self, labels: Sequence[str], components: Sequence[Component], M: Array, low: Array, high: Array) -> None:
+        """``labels`` (r), ``components`` (c), M (..., r, c), low and high (..., r)."""
         for side, sign, bound in (("lower", -1.0, low), ("upper", 1.0, high)):
-            if np.all(np.isfinite(bound)):
-                self.labels.append(f"{side} {label}")
-                self.lines.append((line, sign, sign * np.asarray(bound)))
+            some = np.flatnonzero(np.isfinite(bound).reshape(-1, len(labels)).all(axis=0))
+            if len(some):
+                self.labels.extend(f"{side} {labels[int(i)]}" for i in some)
+                self.blocks.append((tuple(components), sign * M[..., some, :], sign * bound[..., some]))
 
     def done(self) -> Inequalities:
         shape, size = self.partition.shape, len(self.labels)
         C = np.zeros((*shape, size, len(self.partition.X)))
         D = np.zeros((*shape, size, len(self.partition.Y)))
         h = np.empty((*shape, size))
-        for row, (line, sign, bound) in enumerate(self.lines):
-            h[..., row] = bound
-            for component, factor in line.items():
-                unknown, i = self.partition.place(component)
-                (C if unknown else D)[..., row, i] = sign * factor
+        first = 0
+        for components, M, bound in self.blocks:
+            rows = slice(first, first + M.shape[-2])
+            first = rows.stop
+            h[..., rows] = bound
+            places = [self.partition.place(component) for component in components]
+            for side, matrix in ((True, C), (False, D)):
+                mine = [i for i, (unknown, _) in enumerate(places) if unknown is side]
+                matrix[..., rows, [places[i][1] for i in mine]] = M[..., mine]
         return Inequalities(tuple(self.labels), C, D, h)
 
 

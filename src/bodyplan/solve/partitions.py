@@ -14,7 +14,8 @@ from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.model import Robot
 from bodyplan.solve.components import Component, Names, further_feet, speaks_of_coordinates
-from bodyplan.solve.configuration import Model, model
+from bodyplan.solve.configuration import Model
+from bodyplan.solve.configuration import model as model_of
 
 AXES = ("own", "world")
 BODIES = ("twist", "world", "coordinates")
@@ -167,7 +168,7 @@ class Partition:
 
 
 def partition(
-    at: Model | Robot,
+    model: Model | Robot,
     q: ArrayLike | Mapping[str, ArrayLike] | None = None,
     base: ArrayLike | None = None,
     *,
@@ -178,7 +179,7 @@ def partition(
 ) -> Partition:
     """Split the velocity equation (9) of paper *legs* into unknown and known rates, by name.
 
-    ``at``: a :func:`model`, or a robot with ``q`` (..., n), ``base`` (..., 7) and ``feet`` as there.
+    ``model``: a :func:`bodyplan.solve.model`, or a robot with ``q`` (..., n), ``base`` (..., 7) and ``feet`` as there.
 
     ``known``: names of the rates that will be given; all others of the feet, the body and the joints are unknown:
 
@@ -199,7 +200,7 @@ def partition(
     Raises InputError for a choice that does not exist, a name used twice, body given as twist and as coordinates;
     UnknownNameError for a name.
     """
-    at = _model_of(at, q, base, feet)
+    at = _model(model, q, base, feet)
     if isinstance(known, str):
         raise InputError(f"known: expected a sequence of names, got the text {known!r}.")
     names = tuple(known)
@@ -214,16 +215,16 @@ def partition(
     return Partition(at, valid, valid.flat(names, "known"), axes, kind)
 
 
-def _model_of(at: Any, q: Any, base: Any, feet: Any) -> Model:
+def _model(at: Any, q: Any, base: Any, feet: Any) -> Model:
     if isinstance(at, Model):
         if q is not None or base is not None or feet is not None:
             raise InputError("q, base and feet belong to the model; give them to bodyplan.solve.model.")
         return at
     if not isinstance(at, Robot):
-        raise InputError(f"at: expected a Model or a Robot, got {type(at).__name__}.")
+        raise InputError(f"model: expected a Model or a Robot, got {type(at).__name__}.")
     if q is None:
         raise InputError("q: a robot needs joint coordinates.")
-    return model(at, q, base, feet=feet)
+    return model_of(at, q, base, feet=feet)
 
 
 def _listed(names: Iterable[str], most: int = 12) -> str:
