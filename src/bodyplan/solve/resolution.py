@@ -60,7 +60,7 @@ def resolve(
 
     ``damping``: "auto" holds down directions whose singular value is below ``near`` times the largest, and only those:
     rates are then at most the commanded over ``near``. In the default metric a singular value is a speed of feet over a
-    speed of joints; ``near`` = 0.05 keeps a knee from rushing where it is almost straight. A number: lambda of damped
+    speed of joints; ``near`` = 0.02 keeps a knee from rushing where it is almost straight. A number: lambda of damped
     least squares in all directions; 0: never. Damped stance feet slip: see ``residual``, and the status "damped".
 
     Raises InputError for options that do not go together or have a wrong shape, UnknownNameError for a name.
