@@ -100,6 +100,7 @@ class Run:
         model = physics.model
         self._qpos = np.zeros((size, model.nq))
         self._t, self._com, self._force = np.zeros(size), np.zeros((size, 3)), np.zeros((size, model.nu))
+        self._touch = np.zeros((size, len(physics.wheels.pointers)))
         self._airborne, self._count = 0, 0
 
     def go(self) -> None:
@@ -146,15 +147,24 @@ class Run:
         s, n = self._count, self.physics.robot.n
         torque = np.zeros((s, n))
         torque[:, self.physics.servos] = self._force[:s]
-        qpos = self._qpos[:s]
-        return Records(self._t[:s], qpos[:, :7], self.physics.q(qpos), torque, self._com[:s])
+        return Records(self._t[:s], self._qpos[:s, :7], self._joints(), torque, self._com[:s])
+
+    def _joints(self) -> Array:
+        """Recorded joint coordinates (s, n). Contact angles are outcomes: they are as measured."""
+        s, wheels = self._count, self.physics.wheels
+        q = self.physics.q(self._qpos[:s])
+        columns = [pointer.column for pointer in wheels.pointers]
+        if columns and s:
+            planned = self.reference.joints(self.timing.phase(self._t[:s]))[:, columns]
+            q[:, columns] = wheels.angles(self._touch[:s], planned)
+        return q
 
     def warnings(self) -> list[str]:
         """What to know of the run."""
         robot, found, s = self.physics.robot, list[str](), self._count
         if s == 0:
             return found
-        q, force = self.physics.q(self._qpos[:s]), self._force[:s]
+        q, force = self._joints(), self._force[:s]
         for i, column in enumerate(self.physics.servos):
             name, effort = robot.joints[column], robot.efforts[column]
             full = 100.0 * float(np.mean(np.abs(force[:, i]) >= effort * (1.0 - 1e-9)))
@@ -167,7 +177,8 @@ class Run:
             found.append(f"no contact with the ground for {100.0 * self._airborne / s:.1f} % of the time")
         slack = self.physics.coupling_error(self._qpos[:s])
         if slack > 1e-3:
-            found.append(f"axes that share a joint are out of step by up to {slack:.2g} rad or m")
+            what = "slides of wheels" if self.physics.wheels.rings else "axes that share a joint"
+            found.append(f"{what} are out of step by up to {slack:.2g} rad or m")
         if self.walls.depth > 0.0 and self.timing.settle == 0.0:
             found.append(f"without settling the run begins {1e3 * self.walls.depth:.2g} mm inside the walls")
         return found
@@ -180,6 +191,7 @@ class Run:
     def _record(self, t: float) -> None:
         i, data = self._count, self.data
         self._t[i], self._com[i], self._force[i] = t, data.subtree_com[1], data.actuator_force
+        self._touch[i] = self.physics.wheels.directions(data)
         self._airborne += int(data.ncon == 0 and i > 0)  # at first it just touches, which is no contact yet
         if t >= self.timing.start_time:
             self.sliding.add(data)

@@ -169,6 +169,15 @@ def tilt_of(records: Records, reference: Reference, phase: Callable[[Array], Arr
     return float(np.max(np.arctan2(sine, np.sum(planned * executed, axis=1)), initial=0.0))
 
 
+def height_of(
+    records: Records, reference: Reference, phase: Callable[[Array], Array], start: float
+) -> tuple[float, float]:
+    """Executed less planned z of the base from ``start`` s on: (root mean square, largest size) m."""
+    some = records.t >= start - 1e-9
+    error = records.base[some, 2] - reference.bases(phase(records.t[some]))[:, 2]
+    return float(np.sqrt(np.mean(np.square(error)))), float(np.max(np.abs(error)))
+
+
 def slips_of(
     motion: Motion, records: Records, planned: Array, time_of: Callable[[float], float], period: float
 ) -> tuple[Slip, ...]:

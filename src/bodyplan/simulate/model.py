@@ -17,6 +17,7 @@ from bodyplan.simulate.friction import Friction, Scales
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.skeleton import Drives, add_robot
 from bodyplan.simulate.terrain import add_pairs, add_self_pairs, add_solid, geom_name, scales_of
+from bodyplan.simulate.wheels import MOTOR_ARMATURE, TIPS, Wheels, wheel_servos
 
 Servo = tuple[float, float] | Mapping[str, tuple[float, float]] | None
 
@@ -27,7 +28,8 @@ class Physics:
     bodyplan.
 
     ``servos`` (u,) column of q of every actuator. ``gains`` (u, 2) their kp and kv. ``solids`` the ground's,
-    in the order of ``solid_geoms``; ``scales`` what to update before each step, or None.
+    in the order of ``solid_geoms``; ``scales`` what to update before each step, or None; ``wheels`` those of
+    the robot.
     """
 
     robot: Robot
@@ -42,23 +44,28 @@ class Physics:
     qpos_at: IntArray
     dof_at: IntArray
     mean: Array
+    wheels: Wheels
 
     def qpos(self, q: ArrayLike, base: ArrayLike) -> Array:
         """MuJoCo's configuration (nq,) of joint coordinates (n,) and a base pose (7,)."""
         out = np.zeros(self.model.nq)
         out[:7] = base
-        out[self.qpos_at] = self.drives.scale * np.asarray(q, dtype=np.float64)[self.drives.joint]
+        at = np.asarray(q, dtype=np.float64)
+        out[self.qpos_at] = self.drives.scale * at[self.drives.joint]
+        out[self.wheels.slides] = self.wheels.slide(at)
         return out
 
     def q(self, qpos: Array) -> Array:
         """Joint coordinates (..., n) of configurations (..., nq); of a joint that drives several MuJoCo
-        joints, the value that fits them best."""
+        joints, the value that fits them best. 0 for contact angles: a configuration does not have them."""
         return np.asarray(qpos[..., self.qpos_at] @ self.mean)
 
     def coupling_error(self, qpos: Array) -> float:
         """Largest difference between MuJoCo's joints and the joint coordinates that drive them, rad or m."""
-        error = qpos[..., self.qpos_at] - self.drives.scale * self.q(qpos)[..., self.drives.joint]
-        return float(np.max(np.abs(error), initial=0.0))
+        q = self.q(qpos)
+        error = qpos[..., self.qpos_at] - self.drives.scale * q[..., self.drives.joint]
+        slack = qpos[..., self.wheels.slides] - self.wheels.slide(q)
+        return max(float(np.max(np.abs(e), initial=0.0)) for e in (error, slack))
 
     def role(self, *roles: str) -> BoolArray:
         """(solids,) True where a solid has one of the roles."""
@@ -77,6 +84,8 @@ def build(
     armature: float = 1e-3,
     arc_joints: int = 4,
     self_collision: bool = False,
+    rim_tips: int = TIPS,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
 ) -> Physics:
     """Robot and the part of the ground in the box from ``low`` (3,) to ``high`` (3,) m as a MuJoCo model.
 
@@ -84,11 +93,12 @@ def build(
     implicitfast, time step ``dt`` s. ``friction`` overrides the floor's (not the walls'). Joint coordinates
     that have an actuator get a position servo (N m / rad or N / m, and per rate): ``servo`` as in
     :func:`default_servo`. ``self_collision`` lets contacts of the robot touch each other unless they
-    are neighbours (:func:`bodyplan.robot.neighbours.separate_contacts`). See :func:`add_robot` for ``armature``
-    and ``arc_joints``.
+    are neighbours (:func:`bodyplan.robot.neighbours.separate_contacts`) or rims that change their radius. See
+    :func:`add_robot` for ``armature``, ``arc_joints``, ``rim_tips`` and ``ranges``.
 
-    Raises InputError: a robot without mass or contacts, a wheel-radius drive, inertia that no body can have,
-    scale friction where a floor is no plane and no box with a level top, or a contact no capsule and no sphere.
+    Raises InputError: a robot without mass or contacts, a wheel-radius drive without a rim that follows it
+    (:func:`bodyplan.simulate.rims.pointers_of`), inertia that no body can have, scale friction where a floor is
+    no plane and no box with a level top, or a contact no capsule and no sphere.
     """
     mj = mujoco()
     spec = mj.MjSpec()
@@ -100,12 +110,13 @@ def build(
     option.integrator = mj.mjtIntegrator.mjINT_IMPLICITFAST
     number(armature, "armature", at_least=0.0)
     whole(arc_joints, "arc_joints", at_least=1, at_most=64)
-    drives = add_robot(spec, robot, armature=armature, arc_joints=arc_joints)
+    whole(rim_tips, "rim_tips", at_least=8, at_most=360)
+    drives = add_robot(spec, robot, armature=armature, arc_joints=arc_joints, rim_tips=rim_tips, ranges=ranges)
     servos, gains = _add_servos(spec, robot, drives, servo, dt)
     solids = tuple(ground.solids(low, high))
     for solid in solids:
         add_solid(spec, solid)
-    add_pairs(spec, robot, solids, friction)
+    add_pairs(spec, robot, solids, friction, rim_tips)
     if self_collision:
         add_self_pairs(spec, robot)
     spec.worldbody.add_light(
@@ -132,13 +143,14 @@ def build(
         np.array([j.qposadr[0] for j in joints], dtype=np.int64),
         np.array([j.dofadr[0] for j in joints], dtype=np.int64),
         mean,
+        Wheels.of(model, robot, drives.rings, rim_tips),
     )
 
 
 def default_servo(robot: Robot) -> dict[str, tuple[float, float]]:
     """(kp, kv) of every actuated joint: kp = 2 m g L for an angle (N m / rad), 100 m g / L for a length (N /
     m: 1 % of L under the robot's weight), kv = kp / 50 s. m is the robot's mass, L the longest way along
-    its frames from the base at q = 0."""
+    its frames from the base at q = 0. Motors of wheels: :func:`bodyplan.simulate.wheels.wheel_servos`."""
     rest = robot.forward(np.zeros(robot.n))
     way = {"base": 0.0}
     for chain in robot.chains:
@@ -149,8 +161,9 @@ def default_servo(robot: Robot) -> dict[str, tuple[float, float]]:
             parent = frame
     weight, length = robot.mass * 9.81, max(way.values()) or 1.0
     stiffness = {"angle": 2.0 * weight * length, "length": 100.0 * weight / length}
+    wheels = wheel_servos(robot)
     return {
-        name: (stiffness[kind], stiffness[kind] / 50.0)
+        name: wheels.get(name, (stiffness[kind], stiffness[kind] / 50.0))
         for name, kind, driven in zip(robot.joints, robot.kinds, robot.actuated, strict=True)
         if driven
     }
@@ -174,9 +187,9 @@ def _gains(robot: Robot, servo: Servo) -> dict[str, tuple[float, float]]:
 def _add_servos(spec: Any, robot: Robot, drives: Drives, servo: Servo, dt: float) -> tuple[IntArray, Array]:
     """Position servos named as the joints. An actuator's length is q, so that its force is that of q too:
     gear 1 / scale on one MuJoCo joint; on several, a tendon with scale_i / sum of scale^2, and an equality
-    that keeps them in step."""
+    that keeps them in step. Adjust motors of wheels get at least the armature that their ties need."""
     mj, gains = mujoco(), _gains(robot, servo)
-    columns = []
+    columns, motors = [], {ring.joint for ring in drives.rings}
     for column, joint in enumerate(robot.joint_info):
         mine = np.flatnonzero(drives.joint == column)
         names, scales = [drives.names[i] for i in mine], drives.scale[mine]
@@ -197,6 +210,9 @@ def _add_servos(spec: Any, robot: Robot, drives: Drives, servo: Servo, dt: float
                 tendon.wrap_joint(name, float(scale / np.square(scales).sum()))
             act.trntype = mj.mjtTrn.mjTRN_TENDON
         kp, kv = gains[joint.name]
+        if joint.name in motors:
+            hinge = spec.joint(joint.name)
+            hinge.armature = max(float(hinge.armature), MOTOR_ARMATURE * kv * dt)
         act.set_to_position(kp=kp, kv=kv)
         if joint.effort is not None:
             act.forcelimited, act.forcerange = mj.mjtLimited.mjLIMITED_TRUE, [-joint.effort, joint.effort]

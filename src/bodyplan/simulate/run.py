@@ -16,6 +16,7 @@ from bodyplan.simulate.library import mujoco, warnings_kept
 from bodyplan.simulate.loop import Run, Timing
 from bodyplan.simulate.measure import (
     cost_of_transport,
+    height_of,
     lifts_of,
     planned_advance,
     progress_of,
@@ -28,11 +29,14 @@ from bodyplan.simulate.reference import Reference, region
 from bodyplan.simulate.start import Walls, on_the_floor
 from bodyplan.simulate.terrain import CONTACT_STEPS
 from bodyplan.simulate.trial import Trial
+from bodyplan.simulate.wheels import TIPS
 
 #: most time steps of one run: a mistyped dt should not eat the machine
 MOST_STEPS = 50_000_000
 #: s within which a motion speeds up where nobody says
 RAMP = 1.0
+#: rad beyond the planned angles of a wheel's motor over which its radius is right
+RANGE_ROOM = 0.1
 
 
 def simulate(
@@ -49,6 +53,7 @@ def simulate(
     armature: float = 1e-3,
     arc_joints: int = 4,
     self_collision: bool = False,
+    rim_tips: int = TIPS,
 ) -> Trial:
     """Execute ``motion`` in MuJoCo with a position servo on every actuated joint; deterministic.
 
@@ -64,8 +69,13 @@ def simulate(
     of all joints, N m / rad and N m s / rad (N / m for lengths), or one such pair by joint name; default kp
     = 2 m g L with the robot's mass and length, kv = kp / 50 (:func:`bodyplan.simulate.default_servo`); torque
     is limited to the joint's effort. ``dt`` s: time step. ``record_dt`` s: between records. ``progress``:
-    called with the part done in [0, 1]; True draws a bar in the terminal. ``armature``, ``arc_joints`` and
-    ``self_collision``: see :func:`bodyplan.simulate.build`.
+    called with the part done in [0, 1]; True draws a bar in the terminal. ``armature``, ``arc_joints``,
+    ``self_collision`` and ``rim_tips``: see :func:`bodyplan.simulate.build`.
+
+    A wheel of adjustable radius becomes a ring of ``rim_tips`` balls on slides that follow its adjust joint by a
+    polynomial, fitted over the angles that the motion uses (``settings["rim_law_error_m"]`` is how well); its spin is
+    the motor. Contact angles are no joints of the physics: in ``Trial.q`` they are measured from the loads, and as
+    planned where a wheel carries none.
 
     Returns a :class:`Trial`; physics that diverges is its status. Raises InputError for values out of range
     and for robots and grounds that cannot be simulated.
@@ -100,6 +110,8 @@ def simulate(
         armature=armature,
         arc_joints=arc_joints,
         self_collision=self_collision,
+        rim_tips=rim_tips,
+        ranges=_ranges(motion),
     )
     planned = planned_advance(physics, reference, cycles)
     with warnings_kept() as remarks, _reporting(progress) as report:
@@ -120,6 +132,7 @@ def simulate(
             "turned": turned_of(records, reference, timing.phase, start, period, cycles),
             "slip_angle": run.sliding.angle,
             "tilt": tilt_of(records, reference, timing.phase, start),
+            **dict(zip(("height_rms", "height_max"), height_of(records, reference, timing.phase, start), strict=True)),
             "slips": slips_of(motion, records, planned, timing.time_of, period),
             "lifts": lifts_of(motion, records, reference, timing.phase, timing.time_of, period, cycles),
             "positive_work": positive,
@@ -145,8 +158,21 @@ def simulate(
             "armature": armature,
             "arc_joints": arc_joints,
             "self_collision": self_collision,
-        },
+        }
+        | physics.wheels.settings(),
     )
+
+
+def _ranges(motion: Motion) -> dict[str, tuple[float, float]]:
+    """The angles that the motors of wheels use, with some room, by joint."""
+    robot, out = motion.robot, {}
+    for contact in robot.contacts:
+        if contact.drive is not None:
+            column = robot.joint_index(contact.drive.joint.name)
+            q, (low, high) = motion.q[:, column], robot.limits[column]
+            used = np.clip([q.min() - RANGE_ROOM, q.max() + RANGE_ROOM], low, high)
+            out[contact.drive.joint.name] = (float(used[0]), float(used[1]))
+    return out
 
 
 def _ramp(motion: Motion) -> float:

@@ -1,6 +1,7 @@
 """A robot as MuJoCo bodies, joints, sites and contact shapes.
 
-Every frame of the robot becomes a body and a site of the same name. A row ``Rz(theta) Tz(d) Tx(a)
+Every frame of the robot becomes a body and a site of the same name, except those of contact angles, which are outcomes
+(:mod:`bodyplan.simulate.rims`). A row ``Rz(theta) Tz(d) Tx(a)
 Rx(epsilon)`` is one body with a joint for each driven variable: with the row at q = 0 as the body's rest
 pose X, ``A a B b C c D d = X (BCD)^-1 a (BCD) (CD)^-1 b (CD) D^-1 c D d``, so that the joints, parent-most
 first, are screws written in the body's own axes. MuJoCo's joint coordinate is ``scale * q`` of the drive.
@@ -8,6 +9,7 @@ first, are screws written in the body's own axes. MuJoCo's joint coordinate is `
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +17,13 @@ import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError
-from bodyplan.robot.elements import Arc, Body, Contact, Joint, Row, WheelRadius
+from bodyplan.robot.elements import Arc, Body, Contact, Joint, Row, Variable
 from bodyplan.robot.masses import RIM_HALF_WIDTH, previous_origins
 from bodyplan.robot.model import Robot
 from bodyplan.simulate.inertia import Inertial, axis_of, inertial
 from bodyplan.simulate.library import mujoco
+from bodyplan.simulate.rims import RING_SHARE, Ring, given_up, lightened, pointers_of, rims_of, ring_of
+from bodyplan.simulate.wheels import TIPS, add_motor, add_ring
 from bodyplan.spatial.rotations import conjugate, multiply, quaternion_exp, rotate
 
 X, Y, Z = np.eye(3)
@@ -32,11 +36,12 @@ SKIN = (0.86, 0.52, 0.25, 1.0)
 @dataclass(frozen=True)
 class Drives:
     """MuJoCo's D joints of a robot: ``names``, the column of q (``joint``, (D,)) and ``scale`` (D,) of each:
-    MuJoCo coordinate = scale * q[joint]."""
+    MuJoCo coordinate = scale * q[joint]. ``rings``: wheels whose slides follow the joints as well."""
 
     names: tuple[str, ...]
     joint: IntArray
     scale: Array
+    rings: tuple[Ring, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,9 +56,14 @@ class _Hinge:
 
 
 class _Builder:
-    def __init__(self, spec: Any, robot: Robot, armature: float, arc_joints: int) -> None:
+    def __init__(
+        self, spec: Any, robot: Robot, armature: float, arc_joints: int, tips: int, ranges: Mapping[str, Any]
+    ) -> None:
         self.mj, self.spec, self.robot = mujoco(), spec, robot
-        self.armature, self.arc_joints = armature, arc_joints
+        self.armature, self.arc_joints, self.tips = armature, arc_joints, tips
+        self.pointers = {pointer.frame for pointer in pointers_of(robot)}
+        self.rings = _rings(robot, ranges)
+        self.given = given_up(self.rings, robot)
         self.bodies: dict[str, Any] = {}
         self.contacts: dict[str, list[Contact]] = {}
         for contact in robot.contacts:
@@ -70,16 +80,11 @@ class _Builder:
     def _count_uses(self) -> dict[str, list[float]]:
         """Scales of all MuJoCo joints that a joint coordinate drives."""
         uses: dict[str, list[float]] = {}
-        for element in self.robot.elements:
+        for frame, element in zip(self.robot.frames[1:], self.robot.elements, strict=True):
             pieces = self.arc_joints if isinstance(element, Arc) else 1
             for field in element.VARIABLES:
                 value = getattr(element, field)
-                if isinstance(value, WheelRadius):
-                    raise InputError(
-                        f"joint {value.joint.name!r}: a wheel-radius law cannot be simulated yet; drive "
-                        "the length by a prismatic joint instead."
-                    )
-                if isinstance(value, Joint):
+                if isinstance(value, Joint) and frame not in self.pointers:
                     uses.setdefault(value.name, []).extend([value.scale / pieces] * pieces)
         return uses
 
@@ -92,11 +97,18 @@ class _Builder:
                 frame = chain.frame_name(i)
                 if isinstance(element, Arc):
                     self._add_arc(element, frame, parent)
-                else:
+                elif frame not in self.pointers:
                     self._add_row(element, frame, parent)
                 parent = frame
+        for ring in self.rings:
+            self._add_wheel(ring)
         names, joints, scales = zip(*self.made, strict=True) if self.made else ((), (), ())
-        return Drives(tuple(names), np.array(joints, dtype=np.int64), np.array(scales, dtype=np.float64))
+        return Drives(
+            tuple(names),
+            np.array(joints, dtype=np.int64),
+            np.array(scales, dtype=np.float64),
+            self.rings,
+        )
 
     # --- elements -------------------------------------------------------------------------------------------
 
@@ -156,6 +168,16 @@ class _Builder:
                 self._mass(body, self.speck)
         self._furnish(body, frame, arc.body, moves=True)
 
+    def _add_wheel(self, ring: Ring) -> None:
+        column = self.robot.joint_index(ring.joint)
+        if all(ring.joint != name for name, _, _ in self.made):
+            hinge = add_motor(self.bodies[ring.rim.axle], ring.joint, self.armature, self.speck.mass)
+            limits = self.robot.joint_info[column].limits
+            if limits is not None:
+                hinge.limited, hinge.range = self.mj.mjtLimited.mjLIMITED_TRUE, list(limits)
+            self.made.append((ring.joint, column, 1.0))
+        add_ring(self.spec, self.bodies[ring.rim.contact.frame], ring, self.tips, self.robot.mass)
+
     # --- pieces ---------------------------------------------------------------------------------------------
 
     def _body(self, parent: Any, name: str, at: Array, turn: Array, hinges: list[_Hinge], free: bool = False) -> Any:
@@ -186,9 +208,11 @@ class _Builder:
         body.add_site(name=frame, size=[0.002] * 3, group=4)
         shapes = self.contacts.get(frame, [])
         for contact in shapes:
-            self._shape(body, contact)
+            if contact.drive is None:
+                self._shape(body, contact)
         if carried is not None:
-            self._mass(body, inertial(carried, shapes, self.previous[frame]))
+            whole = inertial(carried, shapes, self.previous[frame])
+            self._mass(body, lightened(whole, self.given[frame]) if frame in self.given else whole)
         elif moves:
             self._mass(body, self.speck)
 
@@ -225,20 +249,41 @@ class _Builder:
         )
 
 
-def add_robot(spec: Any, robot: Robot, *, armature: float = 1e-3, arc_joints: int = 4) -> Drives:
+def add_robot(
+    spec: Any,
+    robot: Robot,
+    *,
+    armature: float = 1e-3,
+    arc_joints: int = 4,
+    rim_tips: int = TIPS,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+) -> Drives:
     """Add ``robot`` with a free base to an MjSpec. ``armature``: rotor inertia on every joint coordinate,
     kg m^2 (kg for a length). ``arc_joints``: pieces k of an arc segment, whose end is off by about L phi^2
-    / (12 k^2).
+    / (12 k^2). ``rim_tips``: balls of a wheel that changes its radius, whose mass is taken from its hub or the base;
+    ``ranges``: the angles (low, high) rad that its joint uses, by name (default: its limits).
 
     A moving frame without a body gets 1e-12 of the robot's mass. Raises InputError for a robot without mass
-    and for a wheel-radius drive.
+    and for a wheel-radius drive without a rim.
     """
     if robot.mass <= 0.0:
         raise InputError(f"robot {robot.name!r}: has no mass; give its rows or its base a Body to simulate it.")
-    return _Builder(spec, robot, armature, arc_joints).build()
+    return _Builder(spec, robot, armature, arc_joints, rim_tips, ranges or {}).build()
 
 
-def _rest(value: float | Joint | WheelRadius) -> float:
+def _rings(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> tuple[Ring, ...]:
+    """What wheels that change their radius are made from."""
+    rings = []
+    for rim in rims_of(robot):
+        drive = rim.contact.drive
+        if drive is not None:
+            # a WheelRadius gives its joint limits where nobody else does
+            low, high = ranges.get(drive.joint.name, robot.limits[robot.joint_index(drive.joint.name)])
+            rings.append(ring_of(rim, drive, float(low), float(high), RING_SHARE * robot.mass))
+    return tuple(rings)
+
+
+def _rest(value: Variable) -> float:
     """The variable's value at q = 0."""
     return value.offset if isinstance(value, Joint) else float(value)  # type: ignore[arg-type]
 

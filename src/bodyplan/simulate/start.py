@@ -18,6 +18,7 @@ from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
 from bodyplan.robot.elements import Contact
 from bodyplan.robot.model import Robot
+from bodyplan.robot.rims import contacts_at
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.model import Physics
 from bodyplan.spatial.rotations import rotate
@@ -33,7 +34,7 @@ def on_the_floor(robot: Robot, q: Array, base: Array, ground: Ground) -> Array:
     """
     poses = robot.forward(q, base)
     lift = []
-    for contact in robot.contacts:
+    for contact in contacts_at(robot, q):
         points, radius = _skeleton(contact)
         pose = poses[contact.frame]
         at = pose[:3] + rotate(pose[3:], points)

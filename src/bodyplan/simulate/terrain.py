@@ -13,6 +13,7 @@ from bodyplan.robot.model import Robot
 from bodyplan.robot.neighbours import separate_contacts
 from bodyplan.simulate.friction import DEFAULT, Balls, Friction, Runners, Scales, pair_friction
 from bodyplan.simulate.library import mujoco
+from bodyplan.simulate.wheels import GRIP, TIP_STEPS, TIPS, tip_names
 from bodyplan.spatial.rotations import rotate
 
 #: time constant of a contact in time steps. MuJoCo's default of 20 ms lets loaded contacts creep along the ground, by
@@ -55,10 +56,16 @@ def add_solid(spec: Any, solid: Solid) -> None:
         spec.worldbody.add_geom(type=mj.mjtGeom.mjGEOM_HFIELD, hfieldname=name, pos=[*(at[:2] + half), bottom], **plain)
 
 
-def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: float | Friction | None) -> None:
-    """Explicit pairs of every contact with every solid, named "contact on solid"."""
-    solref = [CONTACT_STEPS * spec.option.timestep, 1.0]
+def add_pairs(
+    spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: float | Friction | None, tips: int = TIPS
+) -> None:
+    """Explicit pairs of every contact with every solid, named "contact on solid"; of a rim with a drive, of every of
+    its ``tips`` balls."""
+    dt = spec.option.timestep
     for contact in robot.contacts:
+        shapes, options = [contact.name], {"solref": [CONTACT_STEPS * dt, 1.0]}
+        if contact.drive is not None:
+            shapes, options = tip_names(contact.name, tips), {"solref": [TIP_STEPS * dt, 1.0], "solimp": list(GRIP)}
         for solid in solids:
             along, across = pair_friction(solid, contact, friction)
             if isinstance(friction, Friction) and solid.role == "floor":
@@ -69,20 +76,24 @@ def add_pairs(spec: Any, robot: Robot, solids: tuple[Solid, ...], friction: floa
                     )
                 if contact.shape != "sphere" and not _has_axis(contact):
                     raise InputError(f"friction: scales need capsules or spheres, contact {contact.name!r} is neither.")
-            spec.add_pair(
-                name=f"{contact.name} on {solid.name}",
-                geomname1=contact.name,
-                geomname2=geom_name(solid),
-                condim=3,
-                friction=[along, across, 0.0, 0.0, 0.0],
-                solref=solref,
-            )
+            for shape in shapes:
+                spec.add_pair(
+                    name=f"{shape} on {solid.name}",
+                    geomname1=shape,
+                    geomname2=geom_name(solid),
+                    condim=3,
+                    friction=[along, across, 0.0, 0.0, 0.0],
+                    **options,
+                )
 
 
 def add_self_pairs(spec: Any, robot: Robot) -> None:
-    """Pairs of the robot's contacts with each other, except of neighbours (``robot/neighbours.py``)."""
+    """Pairs of the robot's contacts with each other, except of neighbours (``robot/neighbours.py``) and of rims with a
+    drive: their balls are no surface that could hold another shape off."""
     for i, j in separate_contacts(robot):
         one, other = robot.contacts[i], robot.contacts[j]
+        if one.drive is not None or other.drive is not None:
+            continue
         mu = max((f for f in (one.friction, other.friction) if f is not None), default=DEFAULT)
         spec.add_pair(
             name=f"{one.name} on {other.name}",

@@ -53,8 +53,9 @@ class Trial:
     """A motion as MuJoCo executed it. All arrays are read-only; quantities that do not exist are None.
 
     Records, every ``settings["record_dt"]`` s from the start of settling: ``t`` (S,) s; ``base`` (S, 7)
-    pose of the base, wxyz; ``q`` (S, n) joint coordinates; ``torque`` (S, n) actuator torque N m or force
-    N, 0 for passive joints; ``com`` (S, 3) centre of mass.
+    pose of the base, wxyz; ``q`` (S, n) joint coordinates (contact angles of wheels: measured from the loads, as
+    planned where there are none); ``torque`` (S, n) actuator torque N m or force N, 0 for passive joints; ``com``
+    (S, 3) centre of mass.
 
     The measured part begins at ``start_time`` s and has ``cycles`` whole cycles of ``period`` s.
     ``planned_advance`` (cycles, 3) and ``advance`` (cycles, 3) m: displacement of the centre of mass a
@@ -96,6 +97,8 @@ class Trial:
     speed: float | None = None
     turned: Array | None = None
     tilt: float | None = None
+    height_rms: float | None = None
+    height_max: float | None = None
     slip_angle: float | None = None
     slips: tuple[Slip, ...] = ()
     lifts: tuple[Lift, ...] = ()
@@ -174,6 +177,8 @@ class Trial:
             "forward_ratio": self.forward_ratio,
             "turned_rad": None if self.turned is None else float(self.turned[-1]),
             "tilt_rad": self.tilt,
+            "height_rms_m": self.height_rms,
+            "height_max_m": self.height_max,
             "slip_angle_rad": self.slip_angle,
             "lift_ratio": self.lift_ratio,
             "sideways_m": None if self.sideways is None else float(self.sideways.mean()),

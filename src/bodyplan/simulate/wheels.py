@@ -1,0 +1,183 @@
+"""Wheels that change their radius while they roll, in MuJoCo, and where wheels touch.
+
+A rim whose radius follows a joint q is a ring of balls on radial slides of the hub. Each slide is tied to one hinge,
+the adjust motor, by an equality slide = polynomial(q). A size that changes at run time would do as well for the shape,
+but it costs its motor nothing; slides pass every load on to q, so that the motor's torque is that of virtual work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bodyplan.arrays import Array, IntArray
+from bodyplan.robot.model import Robot
+from bodyplan.simulate.library import mujoco
+from bodyplan.simulate.rims import Pointer, Ring, pointers_of, rims_of
+
+#: balls of a ring. Between two of them a wheel sinks by R (pi / TIPS)^2 / 2, 0.5 % of its radius
+TIPS = 32
+#: armature of all slides of a ring over the robot's mass: no weight, no load of the motor at rest; ties and contacts of
+#: a light tip get the stiffness of a heavier one
+SLIDE_ARMATURE = 0.02
+#: time constants of ties and of contacts of tips in time steps, and impedances (solimp) of both: with MuJoCo's own a
+#: light tip sinks by centimetres under the load of a wheel
+TIE_STEPS, TIP_STEPS = 2.0, 4.0
+TIE, GRIP = (0.999, 0.999, 1e-3, 0.5, 2.0), (0.99, 0.999, 1e-3, 0.5, 2.0)
+#: least armature of an adjust motor over kv dt. The servo's damping is integrated implicitly, ties do not know of it:
+#: a hinge lighter than that takes up less than a tie pushes, and the wheel shakes itself to pieces
+MOTOR_ARMATURE = 2.0
+RUBBER = (0.2, 0.2, 0.22, 1.0)
+
+
+def tip_names(contact: str, tips: int) -> list[str]:
+    """Names of the balls of a ring, and of their bodies and slides."""
+    return [f"{contact}~{k + 1}" for k in range(tips)]
+
+
+def add_motor(axle: Any, joint: str, armature: float, speck: float) -> Any:
+    """The adjust motor's hinge, on a body as good as massless at the wheel's axle."""
+    mj = mujoco()
+    body = axle.add_body(name=f"{joint}~motor")
+    body.mass, body.explicitinertial, body.fullinertia = speck, True, [speck, speck, speck, 0.0, 0.0, 0.0]
+    return body.add_joint(name=joint, type=mj.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0], armature=armature)
+
+
+def add_ring(spec: Any, hub: Any, ring: Ring, tips: int, robot_mass: float) -> None:
+    """The balls of a ring, their slides, and the ties to the motor's hinge."""
+    mj, contact = mujoco(), ring.rim.contact
+    each = ring.mass / tips
+    angles = 2.0 * np.pi * np.arange(tips) / tips
+    for name, angle in zip(tip_names(contact.name, tips), angles, strict=True):
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        body = hub.add_body(name=name, pos=np.array(contact.start) + ring.rest * out)
+        moment = 0.4 * each * ring.tip**2
+        body.mass, body.explicitinertial, body.fullinertia = each, True, [moment, moment, moment, 0.0, 0.0, 0.0]
+        body.add_joint(
+            name=name,
+            type=mj.mjtJoint.mjJNT_SLIDE,
+            axis=out,
+            armature=SLIDE_ARMATURE * robot_mass / tips,
+        )
+        body.add_geom(
+            name=name,
+            type=mj.mjtGeom.mjGEOM_SPHERE,
+            size=[ring.tip, 0.0, 0.0],
+            contype=0,
+            conaffinity=0,
+            mass=0.0,
+            rgba=RUBBER,
+        )
+        tie = spec.add_equality(name=name, type=mj.mjtEq.mjEQ_JOINT, name1=name, name2=ring.joint)
+        tie.data[:5] = ring.law
+        tie.solref, tie.solimp = [TIE_STEPS * spec.option.timestep, 1.0], TIE
+
+
+@dataclass(frozen=True, eq=False)
+class Wheels:
+    """The wheels of a compiled model.
+
+    ``slides`` (K,) places in qpos of all slides, ``columns`` (K,) the column of q that each follows by ``laws``
+    (K, 5). ``pointers`` the joints that are outcomes; ``axles`` (P,) the bodies that they turn about, and ``geoms``
+    the shapes of their rims. ``rings`` what the wheels were made from, ``tips`` of each.
+    """
+
+    rings: tuple[Ring, ...]
+    tips: int
+    slides: IntArray
+    columns: IntArray
+    laws: Array
+    pointers: tuple[Pointer, ...]
+    axles: IntArray
+    geoms: tuple[IntArray, ...]
+
+    @classmethod
+    def of(cls, model: Any, robot: Robot, rings: Sequence[Ring], tips: int) -> Wheels:
+        """The wheels of a model that has been built with these ``rings``."""
+        made = {ring.rim.contact.name: ring for ring in rings}
+        slides, columns, laws = list[int](), list[int](), list[Array]()
+        shapes: dict[str, list[str]] = {rim.contact.name: [rim.contact.name] for rim in rims_of(robot)}
+        for name, ring in made.items():
+            shapes[name] = tip_names(name, tips)
+            slides += [int(model.joint(tip).qposadr[0]) for tip in shapes[name]]
+            columns += [robot.joint_index(ring.joint)] * tips
+            laws += [ring.law] * tips
+        pointers = pointers_of(robot)
+        return cls(
+            tuple(rings),
+            tips,
+            np.array(slides, dtype=np.int64),
+            np.array(columns, dtype=np.int64),
+            np.reshape(laws, (-1, 5)),
+            pointers,
+            np.array([model.body(pointer.axle).id for pointer in pointers], dtype=np.int64),
+            tuple(
+                np.array([model.geom(shape).id for rim in pointer.rims for shape in shapes[rim]], dtype=np.int64)
+                for pointer in pointers
+            ),
+        )
+
+    def slide(self, q: Array) -> Array:
+        """Coordinates (..., K) of all slides at joint coordinates (..., n)."""
+        at = q[..., self.columns]
+        out = np.zeros_like(at)
+        for coefficient in self.laws.T[::-1]:
+            out = out * at + coefficient
+        return out
+
+    def directions(self, data: Any) -> Array:
+        """(P,) rad: where each rim touches, seen from its axle, from the axle's x about its z: against the mean normal,
+        weighted by load, of all its contacts. NaN where it carries nothing. A wheel's touching ball jumps from one to
+        the next; the normals of the ground do not."""
+        out = np.full(len(self.pointers), np.nan)
+        count = data.ncon
+        if not count or not len(out) or not data.nefc:  # shapes may just meet and not push yet
+            return out
+        contact = data.contact
+        pairs, rows = contact.geom[:count], contact.efc_address[:count]
+        load = np.where(rows >= 0, data.efc_force[np.maximum(rows, 0)], 0.0)
+        normals = contact.frame[:count, :3]
+        for i, (axle, geoms) in enumerate(zip(self.axles, self.geoms, strict=True)):
+            # a contact's normal points from its first shape to its second
+            sign = np.isin(pairs[:, 1], geoms).astype(float) - np.isin(pairs[:, 0], geoms)
+            push = (sign * load) @ normals
+            x, y, _ = -push @ data.xmat[axle].reshape(3, 3)
+            if x or y:
+                out[i] = np.arctan2(y, x)
+        return out
+
+    def angles(self, directions: Array, planned: Array) -> Array:
+        """Contact angles (S, P) rad from measured ``directions`` (S, P), of the turns that are the same the one nearest
+        to the planned one (S, P), which also stands in where nothing touches."""
+        offset, scale = (np.array([getattr(p, name) for p in self.pointers]) for name in ("offset", "scale"))
+        away = directions - (offset + scale * planned)
+        away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+        return np.asarray(np.where(np.isnan(directions), planned, planned + away / scale))
+
+    def settings(self) -> dict[str, Any]:
+        """What to say of the wheels in a trial."""
+        if not self.rings:
+            return {}
+        return {
+            "rim_tips": self.tips,
+            "rim_law_error_m": max(ring.error for ring in self.rings),
+            "rim_law_range": {ring.joint: [ring.low, ring.high] for ring in self.rings},
+        }
+
+
+def wheel_servos(robot: Robot) -> dict[str, tuple[float, float]]:
+    """(kp, kv) of the motors of wheels, by joint: of a spin 11 m g R, of an adjust joint 36 m g R (300 and 1000 N m /
+    rad for 10 kg on wheels of 0.28 m), kv = kp / 50 s. R is the largest radius: an adjust servo that gives way by
+    1/36 rad under the whole weight sinks by less than 1.4 % of R."""
+    out: dict[str, tuple[float, float]] = {}
+    for rim in rims_of(robot):
+        size = robot.mass * 9.81 * rim.contact.radius
+        adjust = None if rim.contact.drive is None else rim.contact.drive.joint.name
+        for joint, factor in ((rim.spin, 11.0), (adjust, 36.0)):
+            if joint is not None:
+                kp = max(factor * size, out.get(joint, (0.0, 0.0))[0])
+                out[joint] = (kp, kp / 50.0)
+    return out
