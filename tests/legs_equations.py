@@ -80,8 +80,8 @@ FRAMES = {10: ("BY", "SR", None), 11: ("SR", "HP", 1), 12: ("HP", "KE", 2), 13: 
 ABOUT = {
     10: "Right, once the twists are read as body-fixed: both parts in the axes of their own frame.",
     11: "Wrong: it is the row (theta_1, 0, 0, 0). Table 1 has (theta_1, 0, a_1, 90 deg): the turn by 90 deg about x "
-    "and the coxa are missing, in the matrix and in the coefficient of the rate. Its angle is theta_1 - theta_0, but (10) "
-    "has turned by theta_0 already and Table 1 says theta_1.",
+    "and the coxa are missing, in the matrix and in the coefficient of the rate. Its angle is theta_1 - theta_0, but "
+    "(10) has turned by theta_0 already and Table 1 says theta_1.",
     12: "Wrong: it is the row (theta_2 - 90 deg, d_2, a_2, 0), which is not in Table 1: that has (theta_2, 0, a_2, 0). "
     "The coefficient of the rate is right.",
     13: 'Sine and cosine are exchanged in row 3. The text above it says "from the hip to the knee"; it leads from the '
