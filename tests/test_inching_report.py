@@ -368,6 +368,12 @@ def test_a_plan_that_cannot_go_says_so_at_the_top(tmp_path: Path) -> None:
     assert "Stops at 0 s" in head and "above_ceiling" in head
 
 
+def test_the_sentence_tells_of_steps() -> None:
+    text = page(outcome(None, climber()), Playback.of(climber(), None), {})
+    assert "a <b>profile</b> (floor with 2 steps and ceiling with 1 step)" in text
+    assert "<b>profile</b> (ceiling 160\u00a0mm)" in page(outcome(None, five()), Playback.of(five(), None), {})
+
+
 def test_what_failed_stands_beside_the_verdict() -> None:
     made = outcome(None, three())
     text = page(made, Playback.of(three(), None), {})

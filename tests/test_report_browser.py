@@ -12,12 +12,15 @@ from pathlib import Path
 import pytest
 
 import bodyplan as bp
+from bodyplan.show import inching
 from bodyplan.show.beside import Beside
+from bodyplan.show.figures import write_figures
 from bodyplan.show.fit_outcome import FitOutcome
 from bodyplan.show.fit_page import fit_page
 from bodyplan.show.outcome import Grid, GridPoint
 from bodyplan.show.playback import Playback
 from bodyplan.show.report import page
+from inching_report_cases import five, five_trial
 from report_cases import cart, caterpillar, evil_report, follower, outcome, roller, stick
 
 
@@ -202,6 +205,30 @@ def test_a_follower_has_its_curve_grid_and_plots(tmp_path: Path, browse) -> None
     places = set(re.findall(r'data-plot="(\w+)"', dom))
     assert {"overlay", "turning", "fit_error", "contacts", "grid"} <= places
     assert dom.count('data-plot="') == dom.count('class="js-plotly-plot"')
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_snake_on_its_anchors_fits_the_window(  # type: ignore[no-untyped-def]
+    width: int, tmp_path: Path, browse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inching, "HEIGHTS", 3)
+    made = outcome(five_trial(), five(), name="run")
+    playback = Playback.of(five(), five_trial())
+    content = page(made, playback, write_figures(made, playback, tmp_path / "figures"))
+    (tmp_path / "probed.html").write_text(with_script(content, PROBE), encoding="utf-8")
+    around = tmp_path / "around.html"
+    around.write_text(AROUND.replace("{width}", str(width)), encoding="utf-8")
+    found = attributes(browse(around, 1300), "html")
+    assert "data-problems" not in found and found["data-wide"] == "" and int(found["data-scroll"]) <= width
+    assert int(found["data-blue"]) > 200
+    path = tmp_path / "plain.html"
+    path.write_text(content, encoding="utf-8")
+    dom = browse(path, width, "#t=0.5&view=side")
+    assert attributes(dom, "body")["data-ready"] == "replay" and "odd anchors move" in readout(dom)
+    places = set(re.findall(r'data-plot="(\w+)"', dom))
+    assert {"support", "tilt", "holding", "holding_joints", "under_ceiling", "ceilings"} <= places
+    assert dom.count('data-plot="') == dom.count('class="js-plotly-plot"')
+    assert 'alt="The body on its anchors' in dom
 
 
 def test_the_page_of_a_fit_runs(tmp_path: Path, browse) -> None:  # type: ignore[no-untyped-def]

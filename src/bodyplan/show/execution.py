@@ -137,11 +137,18 @@ def _losses(trial: Trial, playback: Playback) -> str:
         )
         for row in rows
     ]
-    head = ("stage", "time in the cycle", "slip along", "largest slip", "executed − planned advance")
+    cyclic = playback.period is not None
+    head = (
+        "stage",
+        "time in the cycle" if cyclic else "time",
+        "slip along",
+        "largest slip",
+        "executed − planned advance",
+    )
     return (
         f"<h3>Where the advance goes</h3>\n<p>{_loss_in_words(trial, playback)}</p>"
         + plot("slip", "Negative: backwards. Stages may overlap, then their losses do not add up to the whole.")
-        + plot("lag", "How the executed advance falls behind the planned one within a cycle.")
+        + plot("lag", f"How the executed advance falls behind the planned one{' within a cycle' if cyclic else ''}.")
         + folded(f"Table of all {counted(len(cells), 'stage')}", table(head, cells, numbers=(1, 2, 3, 4)))
     )
 

@@ -191,9 +191,11 @@ def slip_by_stage(outcome: Outcome, playback: Playback) -> Figure | None:
     gained = lag_by_phase(playback)
     if gained is None or not rows:
         return None
+    cyclic = playback.period is not None
     figure = new_figure(max(3.2, 1.1 + 0.24 * len(rows)))
     bars, curve = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
     _slip_bars(bars, rows)
+    bars.set_xlabel(f"mm {'a cycle ' if cyclic else ''}along the planned advance")
     phase, lag = gained
     for k, one in enumerate(lag):
         curve.plot(
@@ -206,9 +208,9 @@ def slip_by_stage(outcome: Outcome, playback: Playback) -> Figure | None:
         )
     curve.plot(phase, 1e3 * lag.mean(axis=0), color=EXECUTED, label="mean")
     curve.axhline(0.0, color="#555", linewidth=0.8)
-    curve.set_xlabel("time in the cycle (s)")
+    curve.set_xlabel("time in the cycle (s)" if cyclic else "time (s)")
     curve.set_ylabel("executed − planned advance (mm)")
-    curve.set_title("Advance lost through a cycle")
+    curve.set_title(f"Advance lost{' through a cycle' if cyclic else ''}")
     curve.legend(loc="lower left")
     return figure
 
@@ -222,7 +224,6 @@ def _slip_bars(ax: Axes, rows: Sequence[StageRow]) -> None:
     ax.axvline(0.0, color="#555", linewidth=0.8)
     ax.set_yticks(place, [row.name for row in rows], fontsize=7)
     ax.invert_yaxis()
-    ax.set_xlabel("mm a cycle along the planned advance")
     ax.set_title("Stage by stage")
     ax.legend(loc="upper center", bbox_to_anchor=(0.4, -0.12 - 0.25 / len(rows)), fontsize=7, ncols=2)
 

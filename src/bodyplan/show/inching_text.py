@@ -87,6 +87,12 @@ def drives(found: Inching) -> str:
     if found.cyclic:
         each = figure(float(made[0].mean()), "m", 4)
         return f"In a cycle every anchor goes {each}, and the next cycle is like it."
+    if made.shape[1] > 3 and not isinstance(found.gait.drive, tuple) and found.gait.drive != "paper":
+        mean, low, high = (figure(float(x), "m", 3) for x in (made.mean(), made.min(), made.max()))
+        return (
+            f"In the mean of {counted(len(made), 'cycle')} an anchor goes {mean}, between {low} and {high}: where it "
+            "lands depends on the ground."
+        )
     told = [listed(figure(float(x), "m", 4) for x in row) for row in made[:TOLD]]
     said = f"The anchors go {told[0]} in the first cycle"
     if len(told) > 1:

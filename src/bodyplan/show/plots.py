@@ -165,7 +165,13 @@ def slip(outcome: Outcome, playback: Playback) -> Plot | None:
             "hovertemplate": "%{y}: %{x} mm<extra></extra>",
         }
 
-    made = layout("mm a cycle along the plan", "", 120 + 26 * len(names), barmode="group", bargap=0.25)
+    made = layout(
+        f"mm {'a cycle ' if playback.period is not None else ''}along the plan",
+        "",
+        120 + 26 * len(names),
+        barmode="group",
+        bargap=0.25,
+    )
     made["yaxis"].update({"autorange": "reversed", "tickfont": {"size": 11}, "type": "category"})
     made["xaxis"].update({"zeroline": True, "zerolinecolor": "#555"})
     data = [
@@ -185,8 +191,9 @@ def lag(playback: Playback) -> Plot | None:
         line(phase, 1e3 * one, f"cycle {k + 1}", "#9ecae8", line={"width": 1}, showlegend=False)
         for k, one in enumerate(gained[:20])
     ]
-    data.append(line(phase, 1e3 * gained.mean(axis=0), "mean of the cycles", EXECUTED))
-    made = layout("time in the cycle (s)", "executed − planned (mm)", 320)
+    cyclic = playback.period is not None
+    data.append(line(phase, 1e3 * gained.mean(axis=0), "mean of the cycles", EXECUTED, showlegend=cyclic))
+    made = layout("time in the cycle (s)" if cyclic else "time (s)", "executed − planned (mm)", 320)
     return _with_stages({"data": data, "layout": made}, playback, 1)
 
 
