@@ -149,11 +149,11 @@ class Ring:
 def ring_of(rim: Rim, drive: WheelRadius, low: float, high: float, mass: float) -> Ring:
     """The ring of a rim whose joint stays between ``low`` and ``high`` rad.
 
-    MuJoCo ties a slide to a joint by a polynomial of degree 4. It is that through the law at the Chebyshev points, good
-    to 1e-4 of the link's length over [0, pi] and to 1e-5 over two thirds of that."""
+    MuJoCo ties a slide to a joint by a polynomial of degree 4. It is that through the law at the Chebyshev points: good
+    to 1.1e-4 of the link's length over [0, pi], to 1.5e-5 over two thirds of that."""
     smallest = float(np.min(drive.radius([low, high])))
     tip = drive.rubber if drive.rubber > 0.0 else min(BARE_TIP * drive.largest, SMALL_TIP * smallest)
-    if not smallest > 0.0:
+    if smallest < 1e-6 * drive.largest:
         raise InputError(f"rim {rim.contact.name!r}: has no radius left at q = {high:.6g} rad and no rubber on it.")
     rest = 0.5 * float(np.sum(drive.radius([low, high]))) - tip
     chebyshev = np.polynomial.Chebyshev.interpolate(lambda q: drive.radius(q) - tip - rest, 4, domain=[low, high])

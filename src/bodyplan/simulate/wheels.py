@@ -42,8 +42,13 @@ def add_motor(axle: Any, joint: str, armature: float, speck: float) -> Any:
     """The adjust motor's hinge, on a body as good as massless at the wheel's axle."""
     mj = mujoco()
     body = axle.add_body(name=f"{joint}~motor")
-    body.mass, body.explicitinertial, body.fullinertia = speck, True, [speck, speck, speck, 0.0, 0.0, 0.0]
+    _ball(body, speck, speck)
     return body.add_joint(name=joint, type=mj.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0], armature=armature)
+
+
+def _ball(body: Any, mass: float, moment: float) -> None:
+    body.mass, body.ipos, body.explicitinertial = mass, np.zeros(3), True
+    body.fullinertia = [moment, moment, moment, 0.0, 0.0, 0.0]
 
 
 def add_ring(spec: Any, hub: Any, ring: Ring, tips: int, robot_mass: float) -> None:
@@ -54,8 +59,7 @@ def add_ring(spec: Any, hub: Any, ring: Ring, tips: int, robot_mass: float) -> N
     for name, angle in zip(tip_names(contact.name, tips), angles, strict=True):
         out = np.array([np.cos(angle), np.sin(angle), 0.0])
         body = hub.add_body(name=name, pos=np.array(contact.start) + ring.rest * out)
-        moment = 0.4 * each * ring.tip**2
-        body.mass, body.explicitinertial, body.fullinertia = each, True, [moment, moment, moment, 0.0, 0.0, 0.0]
+        _ball(body, each, 0.4 * each * ring.tip**2)
         body.add_joint(
             name=name,
             type=mj.mjtJoint.mjJNT_SLIDE,
@@ -82,7 +86,7 @@ class Wheels:
 
     ``slides`` (K,) places in qpos of all slides, ``columns`` (K,) the column of q that each follows by ``laws``
     (K, 5). ``pointers`` the joints that are outcomes; ``axles`` (P,) the bodies that they turn about, and ``geoms``
-    the shapes of their rims. ``rings`` what the wheels were made from, ``tips`` of each.
+    the shapes of their rims. ``rings`` what the wheels were made from, ``tips`` of each; ``dt`` s the time step.
     """
 
     rings: tuple[Ring, ...]
@@ -93,6 +97,7 @@ class Wheels:
     pointers: tuple[Pointer, ...]
     axles: IntArray
     geoms: tuple[IntArray, ...]
+    dt: float
 
     @classmethod
     def of(cls, model: Any, robot: Robot, rings: Sequence[Ring], tips: int) -> Wheels:
@@ -118,6 +123,7 @@ class Wheels:
                 np.array([model.geom(shape).id for rim in pointer.rims for shape in shapes[rim]], dtype=np.int64)
                 for pointer in pointers
             ),
+            float(model.opt.timestep),
         )
 
     def slide(self, q: Array) -> Array:
@@ -163,6 +169,7 @@ class Wheels:
             return {}
         return {
             "rim_tips": self.tips,
+            "rim_contact_time": TIP_STEPS * self.dt,
             "rim_law_error_m": max(ring.error for ring in self.rings),
             "rim_law_range": {ring.joint: [ring.low, ring.high] for ring in self.rings},
         }
