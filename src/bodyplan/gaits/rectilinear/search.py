@@ -226,7 +226,9 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
     for group, name in zip(groups, names, strict=True):
         for i in group:
             _options(walker, best.anchors[None], int(i), name, why)
-    told = [item for item in why.most_common() if item[0][1] != Status.OUT_OF_REACH] or why.most_common()
+    # what the ground forbids is told before what the body cannot do there
+    ground, reach = (Status.BELOW_FLOOR, Status.ABOVE_CEILING), Status.OUT_OF_REACH
+    told = sorted(why.most_common(), key=lambda item: (item[0][1] not in ground, item[0][1] == reach))
     name, status = told[0][0] if told else (names[0], Status.OUT_OF_REACH)
     at = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.anchors[:, 0])} m"
     return _way(best, status, f"No landing spot leads on {at}: {name}: {status}")
