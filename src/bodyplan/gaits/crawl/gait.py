@@ -12,12 +12,11 @@ from bodyplan.arrays import Array, finite, number
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.crawl.legs import Legs
-from bodyplan.gaits.crawl.motion import motion_of
+from bodyplan.gaits.crawl.motion import motion_of, paces
 from bodyplan.gaits.crawl.planner import Plan, Planner
 from bodyplan.gaits.crawl.steps import Course
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Motion
-from bodyplan.robot.elements import Row
 from bodyplan.robot.model import Robot
 
 STABILITIES = ("margin", "barrier", "most")
@@ -25,8 +24,9 @@ FOOTHOLDS = ("nearest", "search")
 BODIES = ("level", "follow")
 #: s of a step, sway and swing, where the user names no cycle time; longest stride as a share of a leg
 STEP_TIME, STRIDE = 3.0, 0.35
-#: share of the time in which a leg swings
-SWINGING = 0.6
+#: share of the time in which some leg swings, if joints are fast enough: they have ROOM below their limits on level
+#: ground; and what the share may be where they are not
+SWINGING, ROOM, BOUNDS = 0.6, 0.85, (0.4, 0.85)
 #: height of the body and outward reach of the feet, as shares of a leg
 HEIGHT, REACH = 0.385, 0.333
 
@@ -38,8 +38,9 @@ class Crawl(Gait):
     ``velocity`` (ahead, to the left) m/s in the body's heading and ``yaw_rate`` rad/s: of the steady motion (a third
     number, up, must be 0: the ground says it). ``cycle_time`` s in which every leg swings once (default: 3 s a leg, or
     less where the stride would be longer than 0.35 of a leg). ``duty``: share of the cycle that a foot stands, above
-    1 - 1/m for m legs (default 1 - 0.6/m: the body moves in 40 % of the time). ``sequence``: names of the legs in the
-    order in which they swing (default: from the rear to the front on the left, then on the right).
+    1 - 1/m for m legs (default 1 - 0.6/m: the body moves in 40 % of the time; between 1 - 0.4/m and 1 - 0.85/m where
+    joints would else be too fast on level ground). ``sequence``: names of the legs in the order in which they swing
+    (default: from the rear to the front on the left, then on the right, as seen in the direction of travel).
 
     ``sway``: "auto", or the share (0: none) of the way from where the body would be to the centroid of the feet that
     stand. ``stability``: how much sway "auto" takes: "margin", the least that keeps the centre of mass ``margin`` m
@@ -104,7 +105,8 @@ class Crawl(Gait):
         self.duty = None if duty is None else number(duty, "duty", above=0.0, below=1.0)
         self.sequence: tuple[str, ...] | None = None
         if sequence is not None:
-            if isinstance(sequence, str) or not all(isinstance(name, str) for name in sequence):
+            listed = isinstance(sequence, Sequence) and not isinstance(sequence, str)
+            if not listed or not all(isinstance(name, str) for name in sequence):
                 raise InputError(f"sequence: expected names of legs, got {sequence!r}.")
             self.sequence = tuple(sequence)
         self.sway: str | float = "auto"
@@ -166,25 +168,31 @@ class Crawl(Gait):
 
     def planner(self, robot: Robot, ground: Ground) -> Planner:
         """The planner for one robot and ground."""
+        duty = _paced(self, robot) if self.duty is None else self.duty
+        return self._planner(robot, ground, duty)
+
+    def _planner(self, robot: Robot, ground: Ground, duty: float) -> Planner:
         legs = Legs.of(robot)
-        size = leg_length(legs)
+        size = self._size(legs)
         height = HEIGHT * size if self.height is None else self.height
         reach = REACH * size if self.reach is None else self.reach
         offsets = legs.roots.copy()
         out = np.linalg.norm(offsets[:, :2], axis=1)
-        if np.any(out <= 0.0):
-            raise InputError(f"Crawl: leg {legs.names[int(out.argmin())]!r} begins in the middle of the body.")
+        middle = int(out.argmin())
+        if out[middle] <= 1e-9 * size:
+            raise InputError(f"Crawl: leg {legs.names[middle]!r} begins in the middle of the body.")
+        if out[middle] + reach <= 0.0:
+            raise InputError(
+                f"reach: leg {legs.names[middle]!r} begins {out[middle]:.4g} m from the middle of the body, its foot "
+                f"must stay on its side of it: more than {-out[middle]:.4g}, got {reach:.4g}."
+            )
         offsets[:, :2] *= ((out + reach) / out)[:, None]
         offsets[:, 2] = 0.0
+        gait = self
         if self.sequence is None:
-            # from the rear to the front on the left, then on the right
-            side = np.where(offsets[:, 1] >= 0.0, 0, 1)
-            names = [legs.names[int(j)] for j in np.lexsort((offsets[:, 0], side))]
+            names = [legs.names[j] for j in self._rear_to_front(legs.roots)]
             gait = Crawl(**({k: v for k, v in self.to_dict().items() if k != "kind"} | {"sequence": names}))
-        else:
-            gait = self
         cycle = self._cycle(size, float(np.linalg.norm(offsets[:, :2], axis=1).max()), len(legs))
-        duty = 1.0 - SWINGING / len(legs) if self.duty is None else self.duty
         swing = (1.0 - duty) * cycle
         sway = cycle / len(legs) - swing
         if sway <= 1e-9 * cycle:
@@ -193,6 +201,26 @@ class Crawl(Gait):
             )
         course = Course(self.velocity, self.yaw_rate, self.start, self.heading)
         return Planner(gait, legs, ground, course, sway, swing, height, offsets)
+
+    def _rear_to_front(self, roots: Array) -> list[int]:
+        """Legs from the rear to the front on the left, then on the right, as seen in the direction of travel."""
+        vx, vy = self.velocity
+        if abs(vy) > abs(vx):
+            along, left = np.sign(vy) * roots[:, 1], -np.sign(vy) * roots[:, 0]
+        else:
+            sign = -1.0 if vx < 0.0 else 1.0
+            along, left = sign * roots[:, 0], sign * roots[:, 1]
+        slack = 1e-9 * float(np.abs(roots).max())
+        return [int(j) for j in np.lexsort((along, left < -slack))]
+
+    def _size(self, legs: Legs) -> float:
+        """Mean length of the legs, m."""
+        size = float(np.mean([leg.length for leg in legs.legs]))
+        if size > 0.0:
+            return size
+        if self.height is None or self.reach is None:
+            raise InputError(f"Crawl: the legs of {legs.robot.name!r} have no length; name height and reach.")
+        return float(np.hypot(self.height, self.reach))
 
     def _cycle(self, size: float, radius: float, count: int) -> float:
         if self.cycle_time is not None:
@@ -218,21 +246,25 @@ class Crawl(Gait):
         return motion_of(self, planner, plan, t, self.period(robot, ground))
 
 
-def leg_length(legs: Legs) -> float:
-    """Mean over the legs of the lengths of their rows from the first actuated joint on, m."""
-    sizes = []
-    for leg in legs.legs:
-        chain = next(c for c in legs.robot.chains if c.name == leg.name)
-        first = next(d.element for d in leg.drives if d.column in leg.columns)
-        rows = [row for row in chain.elements[first:] if isinstance(row, Row)]
-        sizes.append(sum(abs(v) for row in rows for v in (row.a, row.d) if isinstance(v, float)))
-    size = float(np.mean(sizes))
-    if not size > 0.0:
-        raise InputError(f"Crawl: the legs of {legs.robot.name!r} have no length; name height and reach.")
-    return size
-
-
 @lru_cache(maxsize=8)
 def _planned(gait: Crawl, robot: Robot, ground: Ground, until: float) -> tuple[Planner, Plan]:
     planner = gait.planner(robot, ground)
     return planner, planner.made(until)
+
+
+@lru_cache(maxsize=32)
+def _paced(gait: Crawl, robot: Robot) -> float:
+    """The duty that leaves joints time for swings and the body's moves alike, found on level ground."""
+    from bodyplan.ground.plane import Plane
+
+    planner = gait._planner(robot, Plane(), 1.0 - SWINGING / len(robot.chains))
+    count, usual = len(planner.legs), SWINGING
+    if not np.isfinite(robot.rates).any():
+        return 1.0 - usual / count
+    plan = planner.made((2 * count - 0.5) * planner.step_time)
+    swing, sway = paces(gait, planner, plan)
+    least, most = usual * swing / ROOM, 1.0 - (1.0 - usual) * sway / ROOM
+    share = float(np.clip(usual, least, most))
+    if least > most:
+        share = usual * swing / (usual * swing + (1.0 - usual) * sway)
+    return 1.0 - float(np.clip(share, *BOUNDS)) / count

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from bodyplan.gaits.crawl.gait import Crawl
 
 EXACT = 1e-9
-#: share of a lift that may lie between two samples
-BETWEEN = 0.02
+#: m by which a margin may be smaller between the places at which the planner looks
+BETWEEN = 1e-4
 
 
 def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float | None) -> Motion:
@@ -87,7 +87,7 @@ def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float
         qdd=qdd,
         residual=np.where(solved, residual, 0.0),
         status=status,
-        claims=tuple(_claims(planner, plan, t, period)),
+        claims=tuple(_claims(planner, plan, t, feet[..., 2], period)),
         contacts=contacts,
         forces=forces,
         torques=None if held is None else held.torques,
@@ -95,6 +95,21 @@ def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float
         stages=tuple(_stages(planner, plan, period)),
         notes=tuple(_notes(planner, plan, t, beyond, fast, solved)),
     )
+
+
+def paces(gait: Crawl, planner: Planner, plan: Plan) -> tuple[float, float]:
+    """Largest joint rates over their limits while a leg swings, and while the body moves, in the last cycle of a plan;
+    0 without one."""
+    steps = plan.steps[-len(planner.legs) :]
+    if not steps:
+        return 0.0, 0.0
+    tau = np.linspace(0.0, 1.0, 25)
+    spans = [(step.lift_off, step.touch_down) for step in steps] + [(step.begin, step.lift_off) for step in steps]
+    t = np.concatenate([start + (end - start) * tau for start, end in spans])
+    times, back = np.unique(t, return_inverse=True)
+    fast = np.abs(motion_of(gait, planner, plan, times, None).qd) / planner.legs.robot.rates
+    most = fast.max(axis=1)[back].reshape(2, -1).max(axis=1)
+    return float(most[0]), float(most[1])
 
 
 def _body(plan: Plan, t: Array) -> tuple[Array, Array, Array]:
@@ -145,13 +160,14 @@ def _stages(planner: Planner, plan: Plan, period: float | None) -> list[tuple[st
     return out
 
 
-def _claims(planner: Planner, plan: Plan, t: Array, period: float | None) -> list[Claim]:
+def _claims(planner: Planner, plan: Plan, t: Array, heights: Array, period: float | None) -> list[Claim]:
     legs = planner.legs.legs
     at_origin = [j for j, leg in enumerate(legs) if not np.any(leg.local)]
     names = [planner.legs.robot.frames[leg.frame] for leg in legs]
     out: list[Claim] = []
-    tau = np.linspace(0.0, 1.0, 101)
     for n, step in enumerate(plan.steps):
+        if step.touch_down <= t[0]:
+            continue
         if step.begin >= t[-1]:
             break
         stage = f"{planner.legs.names[step.leg]} swings, cycle {n // len(legs) + 1}"
@@ -161,17 +177,18 @@ def _claims(planner: Planner, plan: Plan, t: Array, period: float | None) -> lis
         if still:
             data = {"frames": still, **window, "tolerance": EXACT}
             out.append(Claim("at_rest", f"standing feet at rest: {stage}", data))
-        if step.leg in at_origin and step.touch_down <= t[-1] + EXACT:
-            place, _, _ = step.foot(tau)
-            ends = max(float(step.before[step.leg, 2]), float(step.after[step.leg, 2]))
-            height = float(place[:, 2].max()) - ends
+        inside = (t > step.lift_off + EXACT) & (t < step.touch_down - EXACT)
+        if step.leg in at_origin and inside.any() and t[0] <= step.lift_off and step.touch_down <= t[-1] + EXACT:
+            # as far as the samples show it
+            z = heights[:, step.leg]
+            height = float(z[inside].max() - np.interp([step.lift_off, step.touch_down], t, z).max())
             if height > 0.0:
                 data = {"frames": [names[step.leg]], **(window | {"start": step.lift_off}), "height": height,
-                        "tolerance": BETWEEN * height + EXACT}  # fmt: skip
+                        "tolerance": EXACT}  # fmt: skip
                 out.append(Claim("lifted", f"swinging feet clear of the ground: {stage}", data))
     if planner.legs.robot.mass > 0.0:
-        asked = planner.gait.margin if planner.gait.sway == "auto" else 0.0
-        out.append(Claim("supported", "the centre of mass is over the standing feet", {"required": min(asked, 0.0)}))
+        asked = planner.gait.margin - BETWEEN if planner.gait.sway == "auto" else 0.0
+        out.append(Claim("supported", "the centre of mass is over the standing feet", {"required": asked}))
     if period is not None and plan.status == Status.OK:
         turn = planner.course.yaw_rate * period
         (x0, y0), _ = planner.course.at(0.0)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
-from bodyplan.errors import Status
+from bodyplan.errors import InputError, Status
+from bodyplan.gaits.crawl.footholds import foothold
 from bodyplan.gaits.crawl.legs import Legs, stance_guess
 from bodyplan.gaits.crawl.steps import Course, Step, clear_swing, swing_path
 from bodyplan.ground.base import Ground
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
 #: shares of the way to the centroid of the support that are tried as sway
 SHARES = 41
 #: places of a swing at which the support is tried
-PLACES = np.linspace(0.0, 1.0, 7)
+PLACES = np.linspace(0.0, 1.0, 9)
 #: weight of sway against the logarithms of the distances from the edges
 SWAY_COST = 0.5
-#: rings and directions of a search for footholds
-RINGS, DIRECTIONS = 8, 24
+#: most steps of one plan: a mistyped time should not eat the machine
+MOST_STEPS = 20_000
 #: m of distances that rounding may change
 EXACT = 1e-9
 
@@ -42,6 +43,15 @@ class Plan:
     feet: Array
     steps: tuple[Step, ...]
     guess: Array
+    status: Status = Status.OK
+    reason: str = ""
+    time: float = np.inf
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """Why there is no step, and from which time s on."""
+
     status: Status = Status.OK
     reason: str = ""
     time: float = np.inf
@@ -62,13 +72,9 @@ class Planner:
     guess: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        rough = stance_guess(self.legs, self._reach())
-        q, _ = self.legs.place((self.offsets - [0.0, 0.0, self.height])[None], rough)
+        stance = self.offsets - [0.0, 0.0, self.height]
+        q, _ = self.legs.place(stance[None], stance_guess(self.legs, stance))
         self.guess = q[0]
-
-    def _reach(self) -> tuple[float, float]:
-        out = self.offsets[:, :2] - self.legs.roots[:, :2]
-        return float(np.linalg.norm(out, axis=1).mean()), -self.height
 
     @property
     def step_time(self) -> float:
@@ -76,94 +82,89 @@ class Planner:
         return self.sway_time + self.swing_time
 
     def made(self, until: float) -> Plan:
-        """Steps for ``until`` s at least."""
-        order, count = self.gait.order(self.legs.names), len(self.legs)
-        feet = np.zeros((count, 3))
-        status, reason, time = Status.OK, "", np.inf
-        for place, leg in enumerate(order):
-            spot, why = self._foothold(leg, place - count)
-            if why:
-                status, reason, time = (
-                    Status.NO_CONTACT,
-                    f"{self.legs.names[leg]} has no foothold to begin on: {why}",
-                    0.0,
-                )
-            feet[leg] = spot
-        pose, _, _, _ = self._body(order[-1], -1, feet, feet)
-        first, begun = pose, feet.copy()
-        steps: list[Step] = []
-        n = 0
-        while status == Status.OK and n * self.step_time < until:
-            leg = order[n % count]
-            after = feet.copy()
-            after[leg], why = self._foothold(leg, n)
-            begin = n * self.step_time
-            lift_off = begin + self.sway_time
-            name = self.legs.names[leg]
-            if why:
-                status, reason, time = Status.NO_CONTACT, f"{name} finds no foothold at {lift_off:.4g} s: {why}", begin
-                break
-            radius = self.legs.legs[leg].radius
-            shape = clear_swing(self.ground, feet[leg], after[leg], self.gait.step_height, radius)
-            if shape is None:
-                status, reason, time = (
-                    Status.BELOW_FLOOR,
-                    f"{name} cannot swing over the ground at {lift_off:.4g} s",
-                    begin,
-                )
-                break
-            pose, margin, share, standing = self._body(leg, n, feet, after, shape)
-            if not standing:
-                status, time = Status.OUT_OF_REACH, begin
-                reason = f"a foot is out of reach while {name} swings at {lift_off:.4g} s"
-            elif margin < self.gait.margin - EXACT and self.gait.sway == "auto":
-                status, time = Status.TIPS_OVER, begin
-                reason = (
-                    f"no sway gives {self.gait.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
-                    f"most is {margin:.4g} m"
-                )
-            if status != Status.OK:
-                break
-            steps.append(
-                Step(leg, begin, lift_off, lift_off + self.swing_time, pose, feet.copy(), after, *shape, margin, share)
+        """Steps for ``until`` s at least. InputError for more than MOST_STEPS."""
+        if until > MOST_STEPS * self.step_time:
+            raise InputError(
+                f"Crawl: {until:.4g} s are {until / self.step_time:.3g} steps of {self.step_time:.3g} s, more than the "
+                f"{MOST_STEPS} allowed: a slower walk, a longer cycle_time, or a shorter time."
             )
-            feet = after
-            n += 1
-        return Plan(self.legs, first, begun, tuple(steps), self.guess, status, reason, time)
+        count = len(self.legs)
+        order = self.gait.order(self.legs.names)
+        feet, failure = np.zeros((count, 3)), _Failure()
+        for place, leg in enumerate(order):
+            feet[leg], why = self._foothold(leg, place - count)
+            if why:
+                reason = f"{self.legs.names[leg]} has no foothold to begin on: {why}"
+                failure = _Failure(Status.NO_CONTACT, reason, 0.0)
+        first, begun = self._before(order[-1], feet), feet
+        steps: list[Step] = []
+        while failure.status == Status.OK and len(steps) * self.step_time < until:
+            step = self._step(order[len(steps) % count], len(steps), feet)
+            if isinstance(step, _Failure):
+                failure = step
+            else:
+                steps.append(step)
+                feet = step.after
+        return Plan(self.legs, first, begun, tuple(steps), self.guess, failure.status, failure.reason, failure.time)
+
+    def _before(self, leg: int, feet: Array) -> Array:
+        """Pose (6,) of the body at the end of the step before the first, in which ``leg`` has come to its place among
+        ``feet`` (m, 3): so that a walk that repeats does so from the beginning."""
+        before = feet.copy()
+        spot, why = self._foothold(leg, -1 - len(self.legs))
+        before[leg] = feet[leg] if why else spot
+        shape = clear_swing(self.ground, before[leg], feet[leg], self.gait.step_height, self.legs.legs[leg].radius)
+        pose, _, _, _ = self._body(leg, -1, before, feet, shape or (self.gait.step_height, 1.0))
+        return pose
+
+    def _step(self, leg: int, n: int, feet: Array) -> Step | _Failure:
+        """Step ``n``, in which ``leg`` swings while the others stay at ``feet`` (m, 3)."""
+        name, begin = self.legs.names[leg], n * self.step_time
+        lift_off = begin + self.sway_time
+        after = feet.copy()
+        after[leg], why = self._foothold(leg, n)
+        if why:
+            return _Failure(Status.NO_CONTACT, f"{name} finds no foothold at {lift_off:.4g} s: {why}", begin)
+        radius = self.legs.legs[leg].radius
+        shape = clear_swing(self.ground, feet[leg], after[leg], self.gait.step_height, radius)
+        if shape is None:
+            return _Failure(Status.BELOW_FLOOR, f"{name} cannot swing over the ground at {lift_off:.4g} s", begin)
+        pose, margin, share, reached = self._body(leg, n, feet, after, shape)
+        if not reached.all():
+            lost = self.legs.names[int(np.flatnonzero(~reached)[0])]
+            what = "its way" if lost == name else f"where {lost} stands"
+            reason = f"{what} is out of reach while {name} swings at {lift_off:.4g} s"
+            return _Failure(Status.OUT_OF_REACH, reason, begin)
+        if margin < self.gait.margin - EXACT and self.gait.sway == "auto":
+            reason = (
+                f"no sway gives {self.gait.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
+                f"most is {margin:.4g} m"
+            )
+            if len(self.legs) == 3:
+                reason += " (two feet are no support: a crawl needs four legs)"
+            return _Failure(Status.TIPS_OVER, reason, begin)
+        return Step(leg, begin, lift_off, lift_off + self.swing_time, pose, feet, after, *shape, margin, share)
 
     def _foothold(self, leg: int, n: float) -> tuple[Array, str]:
-        """Centre (3,) m of a foot that swings in step ``n``: below where the body will be in the middle of its stance;
-        and why there is none."""
+        """Centre (3,) m of a foot that swings in step ``n``: below where the body will be in the middle of its stance,
+        or near there; and why there is none."""
         at, heading = self.course.at((n + 0.5 * len(self.legs)) * self.step_time)
         c, s = np.cos(heading), np.sin(heading)
         x, y = self.offsets[leg, :2]
         nominal = at + np.array([c * x - s * y, s * x + c * y])
-        radius = self.legs.legs[leg].radius
-        tried = nominal[None]
-        if self.gait.foothold == "search":
-            rings = self.gait.search_radius * np.arange(1, RINGS + 1) / RINGS
-            angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-            ways = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-            tried = np.concatenate([tried, nominal + (rings[:, None, None] * ways).reshape(-1, 2)])
-        normals = self.ground.normal(tried)
-        points = np.concatenate([tried, self.ground.height(tried)[:, None]], axis=1)
-        centres = points + radius * normals
-        gap = self.ground.clearance(centres) - radius
-        # a ball in a corner or a hollow narrower than itself does not stand on this point
-        stands = gap >= -EXACT - 1e-3 * radius
-        centres = centres + np.maximum(-gap, 0.0)[:, None] * normals
-        flat = np.arccos(np.clip(normals[:, 2], -1.0, 1.0)) <= self.gait.max_slope + EXACT
-        good = np.flatnonzero(stands & flat)
-        if len(good):
-            return centres[good[0]], ""
-        what = "within the search radius" if self.gait.foothold == "search" else "there"
-        return centres[0], f"the ground is steeper than {np.degrees(self.gait.max_slope):.3g} deg, or an edge, {what}"
+        return foothold(
+            self.ground,
+            nominal,
+            self.legs.legs[leg].radius,
+            self.gait.max_slope,
+            self.gait.search_radius if self.gait.foothold == "search" else 0.0,
+        )
 
     def _body(
         self, leg: int, n: float, before: Array, after: Array, shape: tuple[float, float] = (0.0, 1.0)
-    ) -> tuple[Array, float, float, bool]:
+    ) -> tuple[Array, float, float, BoolArray]:
         """Pose (6,) of the body while ``leg`` swings in step ``n``, the least margin m, the share of the sway and
-        whether every foot is in reach."""
+        which feet (m,) are in reach."""
         at, heading = self.course.at(n * self.step_time)
         others = [j for j in range(len(self.legs)) if j != leg]
         stance = before[others]
@@ -177,30 +178,33 @@ class Planner:
         targets = np.tile(feet, (len(shares), 1, 1))
         base = base_of(every)
         q, placed = self.legs.place(seen_from(base, targets), self.guess)
-        good = np.asarray(placed.all(axis=1).reshape(len(shares), -1).all(axis=1))
-        center = center_of_mass(self.legs.robot, q, base)[:, :2]
+        reached: BoolArray = np.all(placed.reshape(len(shares), len(PLACES), -1), axis=1)
+        good: BoolArray = np.all(reached, axis=1)
+        center = (center_of_mass(self.legs.robot, q, base) if self.legs.robot.mass > 0.0 else base)[:, :2]
         distances = edge_distances(np.repeat(stance[None, :, :2], len(center), axis=0), center)
         least = distances.min(axis=1).reshape(len(shares), -1).min(axis=1)
         logs = np.log(
             np.maximum(distances, 1e-6) / self.height, where=np.isfinite(distances), out=np.zeros_like(distances)
         )
         barrier = logs.sum(axis=1).reshape(len(shares), -1).min(axis=1) - SWAY_COST * shares**2
-        k = self._chosen(least, barrier, good)
-        return poses[k], float(least[k]), float(shares[k]), bool(good[k])
+        limits = self.legs.robot.limits
+        inside = np.all((q >= limits[:, 0] - EXACT) & (q <= limits[:, 1] + EXACT), axis=1)
+        within: BoolArray = np.all(inside.reshape(len(shares), -1), axis=1)
+        k = self._chosen(least, barrier, good, within)
+        return poses[k], float(least[k]), float(shares[k]), reached[k]
 
-    def _chosen(self, least: Array, barrier: Array, good: BoolArray) -> int:
-        """Which sway: the least that gives the margin, or the best by the barrier or the margin."""
-        reachable = np.where(good, 1.0, -np.inf)
+    def _chosen(self, least: Array, barrier: Array, good: BoolArray, within: BoolArray) -> int:
+        """Which sway of those that are ``good``: the least that gives the margin, or the best by the barrier or the
+        margin; if it can be with all joints ``within`` their limits."""
         if not good.any():
-            return 0
-        enough = np.flatnonzero(good & (least >= self.gait.margin - EXACT))
-        if self.gait.stability == "margin" and len(enough):
-            return int(enough[0])
-        if self.gait.stability == "barrier":
-            best = np.where(good & (least >= self.gait.margin - EXACT), barrier, -np.inf)
-            if np.isfinite(best).any():
-                return int(best.argmax())
-        return int(np.where(reachable > 0.0, least, -np.inf).argmax())
+            return 0  # no sway at all
+        enough = good & (least >= self.gait.margin - EXACT)
+        wanted = barrier if self.gait.stability == "barrier" else least
+        for mine in (enough & within, enough):
+            if mine.any():
+                first = self.gait.stability == "margin"
+                return int(mine.argmax() if first else np.where(mine, wanted, -np.inf).argmax())
+        return int(np.where(good, least, -np.inf).argmax())
 
     def pose(self, at: Array, heading: float, feet: Array) -> Array:
         """(6,) x, y, z, roll, pitch, yaw over the plane through all feet, level or along it."""

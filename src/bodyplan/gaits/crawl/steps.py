@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.gaits.rectilinear.swing import swing
+from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
 
 #: places along a swing at which it is tried against the ground
@@ -16,6 +16,10 @@ PLACES = 49
 KEEP = 0.4
 #: how a swing is raised where the ground is in its way, and how often; and how early it may rise before a step
 RAISE, TRIES, EARLY = 1.3, 14, (1.0, 0.6, 0.35)
+#: how long a step up that rises early waits before it goes along, as a share of what it is early by
+WAIT = 0.6
+#: m of distances that rounding may change
+EXACT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -65,34 +69,61 @@ class Step:
 
 
 def swing_path(start: Array, end: Array, lift: float, early: float, tau: Array) -> tuple[Array, Array, Array]:
-    """Place, velocity and acceleration (S, 3) by tau of a foot on its way: a cycloid over the straight line."""
+    """Place, velocity and acceleration (S, 3) by tau (S,) in [0, 1] of a foot on its way from ``start`` to ``end``.
+
+    With Q of :func:`blend` the path is Q(tau) along and in height, and ``lift`` 64 tau^3 (1 - tau)^3 above that: rates
+    and accelerations are 0 at both ends. With ``early`` < 1 a foot that steps up rises within that share of tau, and
+    goes along in what is left of it from WAIT (1 - early) on; a step down is its mirror image.
+    """
     way = end - start
-    length = float(np.hypot(way[0], way[1]))
-    ahead = way[:2] / length if length > 0.0 else np.array([1.0, 0.0])
-    found = swing(tau, np.broadcast_to([length, float(way[2])], (len(tau), 2)), np.asarray(lift), np.asarray(early))
-    place, velocity, acceleration = (
-        np.concatenate([v[:, :1] * ahead, v[:, 1:]], axis=1) for v in (found.risen, found.velocity, found.acceleration)
+    wait = WAIT * (1.0 - early)
+    windows = ((wait, 1.0), (0.0, early)) if way[2] >= 0.0 else ((0.0, 1.0 - wait), (1.0 - early, 1.0))
+    (along, left, *along_rates), (climb, fall, *climb_rates) = (_within(tau, *window) for window in windows)
+    hump, *hump_rates = (lift * v for v in _hump(tau))
+    # told from the nearer end, so that feet are exactly there
+    risen = np.stack([way[0] * along, way[1] * along, way[2] * climb + hump], axis=1)
+    landing = np.stack([way[0] * left, way[1] * left, way[2] * fall - hump], axis=1)
+    velocity, acceleration = (
+        np.stack([way[0] * a, way[1] * a, way[2] * c + h], axis=1)
+        for a, c, h in zip(along_rates, climb_rates, hump_rates, strict=True)
     )
-    late = (tau > 0.5)[:, None]
-    landing = np.concatenate([found.landing[:, :1] * ahead, found.landing[:, 1:]], axis=1)
-    return np.where(late, end + landing, start + place), velocity, acceleration
+    return np.where((tau > 0.5)[:, None], end - landing, start + risen), velocity, acceleration
 
 
 def clear_swing(ground: Ground, start: Array, end: Array, lift: float, radius: float) -> tuple[float, float] | None:
-    """The least raised (lift, early) of a swing that takes a ball of ``radius`` m over the ground, or None."""
+    """The least raised (lift, early) of a swing that takes a ball of ``radius`` m over the ground, or None.
+
+    It keeps off the ground by KEEP of its lift, but no farther than its ends have room at their sides."""
     tau = np.linspace(0.0, 1.0, PLACES)[1:-1]
-    u = tau * tau * (3.0 - 2.0 * tau)
-    wanted = KEEP * lift * np.sin(np.pi * u) ** 2
-    # the ends touch the ground themselves
-    wanted = np.where((u < 0.02) | (u > 0.98), -1e-9, wanted)
-    height = lift
-    for _ in range(TRIES):
-        for early in EARLY:
-            place, _, _ = swing_path(start, end, height, early, tau)
-            if np.all(ground.clearance(place) - radius >= wanted):
-                return height, early
-        height *= RAISE
+    up = 2.0 * radius * np.array([0.0, 0.0, 1.0])
+    try:
+        room = min(radius, float((ground.clearance(np.stack([start + up, end + up])) - radius).min()))
+        wanted = np.minimum(KEEP * lift * _hump(tau)[0], max(room, 0.0)) - EXACT
+        height = lift
+        for _ in range(TRIES):
+            for early in EARLY:
+                place, _, _ = swing_path(start, end, height, early, tau)
+                if np.all(ground.clearance(place) - radius >= wanted):
+                    return height, early
+            height *= RAISE
+    except InputError:  # beyond the edge of the ground
+        return None
     return None
+
+
+def _within(tau: Array, first: float, last: float) -> tuple[Array, Array, Array, Array]:
+    """:func:`blend` from ``first`` to ``last``, 1 less it, and its derivatives by tau."""
+    span = last - first
+    done, rest = np.clip((tau - first) / span, 0.0, 1.0), np.clip((last - tau) / span, 0.0, 1.0)
+    value, rate, gain = blend(done)
+    return value, blend(rest)[0], rate / span, gain / span**2
+
+
+def _hump(tau: Array) -> tuple[Array, Array, Array]:
+    """64 tau^3 (1 - tau)^3, 1 in the middle, and its derivatives."""
+    part = tau * (1.0 - tau)
+    slope = 1.0 - 2.0 * tau
+    return 64.0 * part**3, 192.0 * part**2 * slope, 384.0 * part * (slope**2 - part)
 
 
 def blend(tau: Array) -> tuple[Array, Array, Array]:
