@@ -30,9 +30,9 @@ class Holding:
 def holding(snake: InchingSnake, poses: Array, along: Array, anchors: Array, standing: BoolArray) -> Holding | None:
     """Statics at ``poses`` (T, F, 7) of the robot's frames, on level treads and without friction.
 
-    ``along`` (3,): the way forward; ``anchors`` (T, N) m along it; ``standing`` (T, N). Two standing anchors leave no
-    choice. With more, the loads are those that hold with the least sum of squared torques, none of them pulling: what
-    equally stiff servos settle at. None for a robot without masses.
+    ``along`` (3,): the way forward; ``anchors`` (T, N) m: their places in the world along it; ``standing`` (T, N). Two
+    standing anchors leave no choice. With more, the loads are those that hold with the least sum of squared torques,
+    none of them pulling: what equally stiff servos settle at. None for a robot without masses.
     """
     robot = snake.robot
     frames, masses, centres = mass_points(robot)

@@ -50,7 +50,7 @@ def motion_of(gait: Rectilinear, snake: InchingSnake, track: Track, sequence: Se
         failed = t >= (sequence.length - 1e-12 if _moves(sequence) else 0.0)
         status[failed] = sequence.status.value
     standing = _standing(sequence, moment)
-    held = holding(snake, poses.array, track.along, anchors[..., 0], standing)
+    held = holding(snake, poses.array, track.along, track.world(anchors) @ track.along, standing)
     contacts, forces = carrying(snake, standing, held)
     return Motion(
         robot=robot,
