@@ -16,13 +16,14 @@ from bodyplan.gaits.rectilinear.turning import Bends, Stance, closure, flat, ris
 class Bowed:
     """S samples of a move. ``joints`` (3, S, 2 N - 1): nose-up angles of the pitch joints, rates and accelerations by
     tau; ``yaws`` (3, S, 2 N - 2): of the yaw joints, to the left. ``anchors`` (S, N, 3) m above their level, ``tail``
-    (S,) rad: heading of the tail link; ``highest`` (S,) m: of the elbows; ``solved`` (S,)."""
+    (S,) rad: heading of the tail link; ``highest`` and ``lowest`` (S,) m: of the elbows that move; ``solved`` (S,)."""
 
     joints: Array
     yaws: Array
     anchors: Array
     tail: Array
     highest: Array
+    lowest: Array
     solved: BoolArray
 
 
@@ -39,19 +40,19 @@ def bowed(bends: Bends, before: Stance, after: Stance, group: IntArray, lift: fl
         front[0, :, i] = before.legs[0, i, 0]
     anchors = np.repeat(flat(before.at[0])[None], size, axis=0)
     tail = np.full(size, before.heading[0, 0])
-    solved, highest = np.ones(size, dtype=bool), np.zeros(size)
+    solved, highest, lowest = np.ones(size, dtype=bool), np.zeros(size), np.full(size, np.inf)
     for i in map(int, group):
         swung = _Swung.of(before.at[0, i], after.at[0, i], lift, tau)
         anchors[:, i] = swung.place
         part = _Part(bends, before, after, i, swung, tau)
-        good, high = part.fill(legs, rear, front, tail)
+        good, elbows = part.fill(legs, rear, front, tail)
         solved &= good
-        highest = np.maximum(highest, high)
+        highest, lowest = np.maximum(highest, elbows.max(axis=1)), np.minimum(lowest, elbows.min(axis=1))
     joints = np.zeros((3, size, 2 * count - 1))
     joints[:, :, 0::2] = front - rear
     joints[:, :, 1::2] = legs[..., 2]
     yaws = legs[..., [1, 3]].reshape(3, size, 2 * (count - 1))
-    return Bowed(joints, yaws, anchors, tail, highest, solved)
+    return Bowed(joints, yaws, anchors, tail, highest, lowest, solved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,8 @@ class _Part:
     tau: Array
 
     def fill(self, legs: Array, rear: Array, front: Array, tail: Array) -> tuple[BoolArray, Array]:
-        """Write what the chain tells into the arrays of :func:`bowed`; which samples are solved, and how high."""
+        """Write what the chain tells into the arrays of :func:`bowed`; which samples are solved, and the heights
+        (S, e) m of its elbows."""
         count = self.before.at.shape[1]
         if self.i == 0:
             return self._tail(legs, rear, front, tail)
@@ -136,7 +138,7 @@ class _Part:
         legs[:, :, 0] = x[:, 1:], rates[:, 1:], seconds[:, 1:]
         front[:, :, 0] = x[:, 1], rates[:, 1], seconds[:, 1]
         rear[:, :, 1] = _rise(made, 4, rates, seconds)
-        return good, made.ends[:, 2, 2]
+        return good, made.ends[:, 2:3, 2]
 
     def _head(self, legs: Array, rear: Array, front: Array) -> tuple[BoolArray, Array]:
         size, last = len(self.tau), self.i - 1
@@ -159,7 +161,7 @@ class _Part:
         legs[:, :, last] = x, rates, seconds
         front[:, :, last] = x[:, 0], rates[:, 0], seconds[:, 0]
         rear[:, :, self.i] = _rise(made, 3, rates, seconds)
-        return good, made.ends[:, 1, 2]
+        return good, made.ends[:, 1:2, 2]
 
     def _middle(self, legs: Array, rear: Array, front: Array) -> tuple[BoolArray, Array]:
         size, i = len(self.tau), self.i
@@ -199,7 +201,7 @@ class _Part:
         # in the air the joint itself is an unknown
         rear[:, :, i], front[:, :, i] = 0.0, np.stack([x[:, 4], rates[:, 4], seconds[:, 4]])
         rear[:, :, i + 1] = _rise(made, 7, rates, seconds)
-        return good, np.maximum(made.ends[:, 1, 2], made.ends[:, 5, 2])
+        return good, made.ends[:, [1, 5], 2]
 
 
 def _rise(made: Chain, k: int, rates: Array, seconds: Array) -> Array:

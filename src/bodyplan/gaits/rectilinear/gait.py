@@ -31,6 +31,8 @@ DRIVES = ("fastest", "periodic", "paper")
 SCHEDULES = ("wave", "two-phase")
 #: lift where the user names none, of the mean link
 LIFT = 0.1
+#: clearance where the user names none, of the mean link: feet that slip or servos that sag by less touch nothing
+CLEARANCE = 0.03
 MOST_ANCHORS = 101
 MOST_TURNS = 100
 
@@ -57,7 +59,7 @@ class Rectilinear(Gait):
     ``lift`` m of a swinging anchor over level ground (default a tenth of the mean link; 0: it slides); ``path``
     "cycloid". Over steps it is lifted higher where it must be. ``ceiling`` m: the most that the middle of any joint may
     be above the line of the standing anchors' joints; a ceiling of the ground counts beside it, with the body's own
-    radius. ``clearance`` m that the body keeps from edges of steps and the ceiling above them (default 0.01 of the mean
+    radius. ``clearance`` m that the body keeps from edges of steps and the ceiling above them (default 0.03 of the mean
     link, on ground with steps only).
 
     ``margin`` m: how far the centre of mass must stay from both ends of what stands, along the way (default: 0, and not
@@ -206,7 +208,7 @@ class Rectilinear(Gait):
 
     def clearance_of(self, demands: Demands) -> float:
         """Clearance in m."""
-        return 0.01 * float(demands.links.mean()) if self._clearance is None else self._clearance
+        return CLEARANCE * float(demands.links.mean()) if self._clearance is None else self._clearance
 
     def period(self, robot: Robot, ground: Ground | None = None) -> float | None:
         """Time of one cycle on ``ground`` (a level floor where None), s; None where it does not repeat."""

@@ -222,7 +222,11 @@ def _notes(gait: Rectilinear, sequence: Sequence, held: Holding | None, t: Array
         margin = float(held.margin[k])
         if margin < -EXACT:
             notes.append(
-                f"Tips: at {t[k]:.4g} s the centre of mass is {-1e3 * margin:.4g} mm beyond the standing anchors. Five "
-                'anchors in two phases (anchors=5, schedule="two-phase") stand around it all the time.'
+                f"Tips: at {t[k]:.4g} s the centre of mass is {-1e3 * margin:.4g} mm beyond the standing anchors."
+                + (
+                    ' Five anchors in two phases (anchors=5, schedule="two-phase") can stand around it all the time.'
+                    if gait.anchors == 3
+                    else ""
+                )
             )
     return notes

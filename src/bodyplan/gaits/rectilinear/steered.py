@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from bodyplan.gaits.rectilinear.motion import BETWEEN, EXACT, carrying
 from bodyplan.gaits.rectilinear.sequence import settled
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.gaits.rectilinear.track import Track
-from bodyplan.gaits.rectilinear.turning import Bends, Stance, lands, turn
+from bodyplan.gaits.rectilinear.turning import Bends, Stance, turn
 from bodyplan.motion import Claim, Motion
 
 if TYPE_CHECKING:
@@ -24,8 +24,12 @@ if TYPE_CHECKING:
 
 #: legs of a steering snake are at most this share of straight: a straight leg cannot bend sideways
 NOT_STRAIGHT = 0.97
+#: and at least this share of it apart: one that is folded up cannot either
+FOLDED = 0.25
 #: places along a move at which it is tried
 PLACES = 129
+#: rad: how far the end of a move may be from the stance it leads to
+LANDED = 1e-8
 #: most cycles of a steered gait
 MOST_CYCLES = 1000
 
@@ -65,6 +69,7 @@ def steered_course(gait: Rectilinear, snake: InchingSnake, track: Track, until: 
         raise InputError("Rectilinear: steer needs a level floor; this profile has steps.")
     bends = Bends(snake)
     demands = snake.demands(room_above(gait, snake, track), gait.least_margin)
+    demands = replace(demands, nearest=max(demands.nearest, FOLDED * float(demands.straight.max())))
     least = least_time(gait, demands)
     long = gait.spacings(demands)
     found = stride_on_level(gait, demands, least)
@@ -105,11 +110,10 @@ class _Plan:
         while time < until and cycle < most and status == Status.OK:
             if cycle in turns:
                 heading = _nearest(turns[cycle], float(here.heading[0, 0]))
-                found = turn(self.bends, here, heading, self.long, self.stride, self.gait.schedule)
-                stances, moving = found.stances, found.groups
-                if found.status != Status.OK:
-                    status = found.status
+                stances, moving, status = self._turn(here, heading, len(groups))
+                if status != Status.OK:
                     reason = f"no way to turn from {here.heading[0, 0]:.4g} to {turns[cycle]:.4g} rad: {status}"
+                    break
             else:
                 stances, moving = self._straight_on(here), groups
             for k, group in enumerate(moving):
@@ -124,21 +128,45 @@ class _Plan:
             cycle += max(1, len(moving) // len(groups))
         return SteeredCourse(tuple(moves), here, time, status, reason, self.long, self.stride)
 
+    def _turn(self, here: Stance, heading: float, size: int) -> tuple[list[Stance], list[IntArray], Status]:
+        """Stances and groups of a turn all of whose moves can be made, in as few cycles (of ``size`` moves) as that
+        takes; else the first reason against it."""
+        fewest, first = 2, Status.OK
+        while True:
+            found = turn(self.bends, here, heading, self.long, self.stride, self.gait.schedule, fewest)
+            if found.status != Status.OK:
+                return [here], [], first if first != Status.OK else found.status
+            tried = (
+                self._tried(a, b, g)[1]
+                for a, b, g in zip(found.stances[:-1], found.stances[1:], found.groups, strict=True)
+            )
+            bad = next((status for status in tried if status != Status.OK), Status.OK)
+            if bad == Status.OK:
+                return found.stances, found.groups, bad
+            first = bad if first == Status.OK else first
+            fewest = len(found.groups) // size + 1
+
     def _straight_on(self, here: Stance) -> list[Stance]:
+        """The stances of a cycle without turning: every anchor goes on by a stride, legs are planar."""
         out = [here]
-        heading = here.heading[:, 0]
+        heading = float(here.heading[0, 0])
+        ahead = self.stride * np.array([np.cos(heading), np.sin(heading)])
         for group in phases(self.snake.anchors, self.gait.schedule):
-            for i in map(int, group):
-                chord = float(self.long[0] - self.stride) if i == 0 else float(self.long[i - 1])
-                here, _ = lands(self.bends, here, i, chord, heading)
-            out.append(here)
+            at = out[-1].at.copy()
+            at[:, group] += ahead
+            chords = np.linalg.norm(np.diff(at[0], axis=0), axis=1)
+            none = np.zeros(1)
+            legs = np.stack([self.bends.planar(i, chord[None], none)[0] for i, chord in enumerate(chords)])
+            out.append(Stance(at, out[-1].heading, legs[None]))
         return out
 
     def _tried(self, before: Stance, after: Stance, group: IntArray) -> tuple[float, Status]:
         """Time of a move, s, and the first demand that it breaks."""
         lift = self.gait.lift_of(self.demands)
         made = bowed(self.bends, before, after, group, lift, np.linspace(0.0, 1.0, PLACES))
-        if not made.solved.all():
+        # the chain must lead where the stances say, with its elbows up
+        apart = np.abs(made.yaws[0, -1] - after.legs[0][:, [1, 3]].ravel()).max()
+        if not made.solved.all() or apart > LANDED or made.lowest.min() < 0.0:
             return self.least, Status.OUT_OF_REACH
         if made.highest.max() > self.demands.ceiling + 1e-9:
             return self.least, Status.ABOVE_CEILING
@@ -172,6 +200,7 @@ def steered_motion(gait: Rectilinear, snake: InchingSnake, track: Track, course:
     q, qd, qdd = (np.zeros((size, robot.n)) for _ in range(3))
     base, anchors = np.zeros((size, 7)), np.zeros((size, snake.anchors, 3))
     standing = np.ones((size, snake.anchors), dtype=bool)
+    solved = np.ones(size, dtype=bool)
     bends, lift = Bends(snake), gait.lift_of(snake.demands(np.inf))
     starts = np.array([move.start for move in course.moves])
     which = np.searchsorted(starts, t, side="right") - 1 if len(starts) else np.full(size, -1)
@@ -187,6 +216,7 @@ def steered_motion(gait: Rectilinear, snake: InchingSnake, track: Track, course:
             tau = settled(tau)
             made = bowed(bends, move.before, move.after, move.group, lift, tau)
             duration = move.duration
+        solved[rows] = made.solved
         values = coordinates(snake, made)
         q[rows], qd[rows], qdd[rows] = values[0], values[1] / duration, values[2] / duration**2
         anchors[rows] = made.anchors + np.array([0.0, 0.0, track.floor + snake.rest])
@@ -200,6 +230,7 @@ def steered_motion(gait: Rectilinear, snake: InchingSnake, track: Track, course:
     poses = robot.forward(q, base)
     frames = [robot.frame_index(name) for name in snake.frames[0::2]]
     status = np.full(size, Status.OK.value, dtype="U24")
+    status[~solved] = Status.OUT_OF_REACH.value
     if course.status != Status.OK:
         status[t >= course.end - 1e-12] = course.status.value
     contacts, _ = carrying(snake, standing, None)

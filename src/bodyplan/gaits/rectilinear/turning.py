@@ -92,6 +92,7 @@ def lands(bends: Bends, stance: Stance, i: int, chord: float, heading: Array) ->
     out.at[:, i], out.heading[:, i] = at, way
     for k, values in legs.items():
         out.legs[:, k] = values
+        good = good & (values[:, 2] < 0.0)  # elbows up
     return out, good
 
 
@@ -200,11 +201,14 @@ class Turn:
     status: Status
 
 
-def turn(bends: Bends, start: Stance, heading: float, long: Array, stride: float, schedule: str) -> Turn:
-    """Landing spots that bring a straight snake to ``heading`` rad, straight again, in as few cycles as bend no leg by
-    more than :data:`MOST_BEND`. Legs are ``long`` (N - 1,) m at their longest, as in the gait that goes straight."""
+def turn(
+    bends: Bends, start: Stance, heading: float, long: Array, stride: float, schedule: str, fewest: int = 2
+) -> Turn:
+    """Landing spots that bring a straight snake to ``heading`` rad, straight again, in as few cycles, at least
+    ``fewest``, as bend no leg by more than :data:`MOST_BEND`. Legs are ``long`` (N - 1,) m at their longest, as in the
+    gait that goes straight."""
     count = start.at.shape[1]
-    for cycles in range(2, MOST_CYCLES + 1):
+    for cycles in range(fewest, MOST_CYCLES + 1):
         free = 2 * (cycles - 1)
         if free < count - 2:
             continue
