@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from bodyplan.gaits.rectilinear.strides import (
     stride_of,
 )
 from bodyplan.gaits.rectilinear.track import Track
+from bodyplan.robot.model import Robot
 
 if TYPE_CHECKING:
     from bodyplan.gaits.rectilinear.gait import Rectilinear
@@ -38,9 +40,10 @@ MOST_CYCLES = 400
 def course_of(gait: Rectilinear, snake: InchingSnake, track: Track, until: float) -> Sequence:
     """The moves of ``gait``, the first anchor at s = the tail's length; those that do not repeat last for ``until`` s
     at least, or as long as they can."""
-    demands = snake.demands(room_above(gait, snake, track), gait.least_margin)
+    room = room_above(gait, snake, track)
+    demands = snake.demands(room, gait.least_margin)
     least = least_time(gait, demands)
-    found = stride_on_level(gait, demands, least)
+    found = _stride(gait, snake.robot, room)
     if track.level:
         if found is not None and found.status == Status.OK:
             return _repeated(found, snake, track, gait)
@@ -56,6 +59,13 @@ def least_time(gait: Rectilinear, demands: Demands) -> float:
     if gait.move_time is not None:
         return gait.move_time
     return 1e-3 if len(demands.rates) and np.isfinite(demands.rates).all() else MOVE_TIME
+
+
+@lru_cache(maxsize=16)
+def _stride(gait: Rectilinear, robot: Robot, room: float) -> Stride | None:
+    """:func:`stride_on_level`, searched once for plans of any length."""
+    demands = InchingSnake.of(robot, gait.anchors, gait.joints).demands(room, gait.least_margin)
+    return stride_on_level(gait, demands, least_time(gait, demands))
 
 
 def stride_on_level(gait: Rectilinear, demands: Demands, least: float) -> Stride | None:
