@@ -9,6 +9,7 @@ import mpmath as mp
 import numpy as np
 
 import bodyplan as bp
+from bodyplan.motion import Motion
 
 #: Figs. 8 and 11 of the paper: 1000 mm modules, two of them between pitch joints
 MODULES = {"axes": "alternating", "first": "pitch", "radius": 1e-3, "mass": 1.0}
@@ -16,6 +17,28 @@ MODULES = {"axes": "alternating", "first": "pitch", "radius": 1e-3, "mass": 1.0}
 
 def paper_snake() -> bp.Robot:
     return bp.snake(10, 1.0, **MODULES)
+
+
+#: what the gait knows to be false of three anchors that move one by one
+TIPS = "the centre of mass is over the standing anchors"
+OPTIONS = {"axes": "alternating", "first": "pitch", "mass": 0.25}
+THIN = OPTIONS | {"radius": 0.005}
+FEET = OPTIONS | {"foot_radius": 0.003, "foot_spread": 0.06}
+
+
+def snake(anchors: int = 3, **options: Any) -> bp.Robot:
+    return bp.snake(4 * anchors - 2, 0.1, **(THIN | options))
+
+
+def planned(robot: bp.Robot, gait: Any, ground: Any = None, samples: int = 121, cycles: float = 1.0) -> Motion:
+    """Over a number of cycles where it repeats, or else 6 s."""
+    ground = bp.Plane() if ground is None else ground
+    period = gait.period(robot, ground)
+    return bp.plan(robot, gait, ground, np.linspace(0.0, cycles * (period or 6.0), samples))
+
+
+def failures(motion: Motion) -> set[str]:
+    return {line.what for line in bp.check(motion).failures}
 
 
 def chain(start: Any, joints: Any, links: Any) -> np.ndarray:
@@ -88,3 +111,23 @@ def joints_by_hand(anchors: Any, links: Any) -> np.ndarray:
     angles = np.stack([alpha + angle(a, b), alpha - angle(b, a)], axis=-1).reshape(*x.shape[:-1], -1)
     level = np.zeros((*angles.shape[:-1], 1))
     return np.diff(np.concatenate([level, angles, level], axis=-1), axis=-1)
+
+
+def unit_ends(motion: Any, lengths: Any) -> np.ndarray:
+    """Ends (T, units + 1, 3) of a snake's units, tail end first, from its base and pitch joints alone: units in a row
+    in an upright plane, each bent nose-down against the one behind it."""
+    x, y, z, w, i, j, k = motion.base.T
+    assert np.all(np.abs(i) + np.abs(j) < 1e-15)
+    heading = 2.0 * np.arctan2(k, w)
+    pitch = {int(name[5:]): c for c, name in enumerate(motion.robot.joints) if name.startswith("pitch")}
+    yaws = [c for c, name in enumerate(motion.robot.joints) if name.startswith("yaw")]
+    assert np.all(motion.q[:, yaws] == 0.0)
+    angle, at, ends = np.zeros(len(x)), np.stack([x, y, z], axis=-1), []
+    ends.append(at)
+    for unit, length in enumerate(lengths):
+        if unit in pitch:
+            angle = angle - motion.q[:, pitch[unit]]
+        ahead = np.stack([np.cos(angle) * np.cos(heading), np.cos(angle) * np.sin(heading), np.sin(angle)], axis=-1)
+        at = at + length * ahead
+        ends.append(at)
+    return np.stack(ends, axis=1)
