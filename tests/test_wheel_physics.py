@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -125,11 +126,14 @@ def test_the_body_rises_with_the_radius_and_motors_do_the_work_of_lifting() -> N
     trial = bp.simulate(motion, settle=0.5, ramp=0.0)
     assert trial.ok and trial.warnings == ()
     assert trial.height_max is not None and trial.height_max <= 3e-3
-    assert trial.height_rms is not None and trial.height_rms <= 2e-3
+    later = trial.t >= trial.start_time
+    error = trial.base[later, 2] - np.interp(trial.t[later] - trial.start_time, t, LAW.radius(q))
+    assert trial.height_max == pytest.approx(np.abs(error).max(), abs=2e-5)
+    assert trial.height_rms == pytest.approx(np.sqrt(np.mean(error**2)), abs=2e-5)
+    assert trial.metrics()["height_rms_m"] == trial.height_rms
     assert trial.tilt is not None and trial.tilt <= 0.1 * DEGREE
     # the advance of this plan is upwards
     assert trial.advance_ratio is not None and trial.advance_ratio == pytest.approx(1.0, abs=0.01)
-    later = trial.t >= trial.start_time
     lifted = WEIGHT * float(np.ptp(trial.com[later, 2]))
     assert lifted == pytest.approx(WEIGHT * float(LAW.radius(1.6) - LAW.radius(2.4)), rel=0.02)
     work = sum(
@@ -200,8 +204,58 @@ def test_wheels_keep_the_body_level_over_ripples() -> None:
         mean, expected = (np.convolve(v[rolling], np.full(10, 0.1), "valid") for v in (torque, static))
         np.testing.assert_allclose(mean, expected, rtol=0.12)
         planned = np.interp(trial.t - trial.start_time - 0.25, t, joints[f"{wheel}.contact"])
-        assert np.abs(planned).max() > 4.0 * DEGREE
-        assert np.abs(angle - planned)[rolling].max() < 3.0 * DEGREE
+        # the angle is measured by one or two balls on the facets of a height field, to some degrees but without bias
+        off = (angle - planned)[rolling]
+        assert np.abs(planned[rolling]).max() > 4.0 * DEGREE
+        assert abs(off.mean()) < 0.5 * DEGREE and off.std() < 1.5 * DEGREE
+
+
+def circling(robot: bp.Robot, turn_radius: float, speed: float, seconds: float, ahead: float) -> Motion:
+    """Along a circle to the left, each wheel as it rolls there; the point ``ahead`` m of the base is on the circle."""
+    t, radius = np.linspace(0.0, seconds, 41), 0.2
+    rate = speed / turn_radius
+    yaw = rate * t
+    joints = every(adjust=float(angle_for(radius)))
+    joints |= {f"{wheel}.spin": (speed - rate * y) * t / radius for wheel, (_, y) in PLACES.items()}
+    motion = made(robot, bp.Plane(), t, 0.0, radius, joints)
+    base = motion.base.copy()
+    base[:, 0] = turn_radius * np.sin(yaw) - ahead * np.cos(yaw)
+    base[:, 1] = turn_radius * (1.0 - np.cos(yaw)) - ahead * np.sin(yaw)
+    base[:, 3], base[:, 6] = np.cos(0.5 * yaw), np.sin(0.5 * yaw)
+    return motion.replace(base=base)
+
+
+def yaw_of(trial: bp.Trial) -> Any:
+    return np.unwrap(2.0 * np.arctan2(trial.base[:, 6], trial.base[:, 3]))
+
+
+@pytest.mark.parametrize(("friction", "turn_radius"), [(1.0, 1.0), (0.5, 2.0)])
+def test_three_parallel_axles_of_equal_friction_make_a_fifth_of_a_turn(friction: float, turn_radius: float) -> None:
+    # least power of friction: the rear wheel, which has half of the load, sticks; the front wheels slip by
+    # (1 - s) L_y along and 2 s L_x across (times the yaw rate), which is least at this share s
+    share = 0.6**2 / (0.6**2 + (2.0 * 0.6) ** 2)
+    motion = circling(bp.tri_wheel(), turn_radius, 0.2, 4.0, ahead=0.0)
+    trial = bp.simulate(motion, friction=friction, settle=0.5, ramp=0.5)
+    assert trial.ok and trial.warnings == ()
+    some = trial.t > 2.0
+    rate = np.polyfit(trial.t[some], yaw_of(trial)[some], 1)[0]
+    assert rate * turn_radius / 0.2 == pytest.approx(share, rel=0.05)
+
+
+def test_with_a_slippery_rear_wheel_the_front_axle_follows_a_circle() -> None:
+    robot = bp.tri_wheel()
+    slippery = [replace(c, friction=0.1) if c.name == "r.rim" else c for c in robot.contacts]
+    robot = replace(robot, contacts=tuple(slippery))
+    motion = circling(robot, 1.0, 0.2, 4.0, ahead=0.6)
+    trial = bp.simulate(motion, settle=0.5, ramp=0.5)
+    assert trial.ok and trial.warnings == ()
+    assert trial.turned is not None and abs(trial.turned[-1]) < 4.0 * DEGREE
+    assert abs(yaw_of(trial)[-1] - 0.8) < 4.0 * DEGREE
+    executed, planned = (
+        b[:2] + 0.6 * np.array([b[3] ** 2 - b[6] ** 2, 2.0 * b[3] * b[6]]) for b in (trial.base[-1], motion.base[-1])
+    )
+    assert np.linalg.norm(executed - planned) < 0.05
+    assert trial.tilt is not None and trial.tilt <= 0.3 * DEGREE
 
 
 def test_rims_of_fixed_radius_roll() -> None:

@@ -17,7 +17,7 @@ from bodyplan.simulate.friction import Friction, Scales
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.skeleton import Drives, add_robot
 from bodyplan.simulate.terrain import add_pairs, add_self_pairs, add_solid, geom_name, scales_of
-from bodyplan.simulate.wheels import MOTOR_ARMATURE, TIPS, Wheels, wheel_servos
+from bodyplan.simulate.wheels import MOTOR_ARMATURE, RIM_IMPRATIO, TIPS, Wheels, soften, wheel_servos
 
 Servo = tuple[float, float] | Mapping[str, tuple[float, float]] | None
 
@@ -89,9 +89,10 @@ def build(
 ) -> Physics:
     """Robot and the part of the ground in the box from ``low`` (3,) to ``high`` (3,) m as a MuJoCo model.
 
-    Contacts touch the ground through explicit pairs: elliptic friction cones, impratio 10, integrator
-    implicitfast, time step ``dt`` s. ``friction`` overrides the floor's (not the walls'). Joint coordinates
-    that have an actuator get a position servo (N m / rad or N / m, and per rate): ``servo`` as in
+    Contacts touch the ground through explicit pairs: elliptic friction cones, impratio 10 (100 for a robot on wheels,
+    whose contacts are softer: :func:`bodyplan.simulate.wheels.soften`), integrator implicitfast, time step ``dt`` s.
+    ``friction`` overrides the floor's (not the walls'). Joint coordinates that have an actuator get a position servo
+    (N m / rad or N / m, and per rate): ``servo`` as in
     :func:`default_servo`. ``self_collision`` lets contacts of the robot touch each other unless they
     are neighbours (:func:`bodyplan.robot.neighbours.separate_contacts`) or rims that change their radius. See
     :func:`add_robot` for ``armature``, ``arc_joints``, ``rim_tips`` and ``ranges``.
@@ -106,7 +107,8 @@ def build(
     spec.compiler.degree = False
     option = spec.option
     option.timestep = number(dt, "dt", above=0.0)
-    option.cone, option.impratio = mj.mjtCone.mjCONE_ELLIPTIC, 10.0
+    wheeled = any(contact.shape == "rim" for contact in robot.contacts)
+    option.cone, option.impratio = mj.mjtCone.mjCONE_ELLIPTIC, RIM_IMPRATIO if wheeled else 10.0
     option.integrator = mj.mjtIntegrator.mjINT_IMPLICITFAST
     number(armature, "armature", at_least=0.0)
     whole(arc_joints, "arc_joints", at_least=1, at_most=64)
@@ -126,6 +128,8 @@ def build(
         model = spec.compile()
     except ValueError as error:
         raise InputError(f"robot {robot.name!r} cannot be simulated: {error}") from error
+    wheels = Wheels.of(model, robot, drives.rings, rim_tips)
+    soften(spec, model, wheels.shapes)
     joints = [model.joint(name) for name in drives.names]
     mean = np.zeros((len(joints), robot.n))
     mean[np.arange(len(joints)), drives.joint] = drives.scale
@@ -143,7 +147,7 @@ def build(
         np.array([j.qposadr[0] for j in joints], dtype=np.int64),
         np.array([j.dofadr[0] for j in joints], dtype=np.int64),
         mean,
-        Wheels.of(model, robot, drives.rings, rim_tips),
+        wheels,
     )
 
 
@@ -187,9 +191,9 @@ def _gains(robot: Robot, servo: Servo) -> dict[str, tuple[float, float]]:
 def _add_servos(spec: Any, robot: Robot, drives: Drives, servo: Servo, dt: float) -> tuple[IntArray, Array]:
     """Position servos named as the joints. An actuator's length is q, so that its force is that of q too:
     gear 1 / scale on one MuJoCo joint; on several, a tendon with scale_i / sum of scale^2, and an equality
-    that keeps them in step. Adjust motors of wheels get at least the armature that their ties need."""
+    that keeps them in step. Motors of wheels get at least the armature that ties and contacts need."""
     mj, gains = mujoco(), _gains(robot, servo)
-    columns, motors = [], {ring.joint for ring in drives.rings}
+    columns, motors = [], wheel_servos(robot)
     for column, joint in enumerate(robot.joint_info):
         mine = np.flatnonzero(drives.joint == column)
         names, scales = [drives.names[i] for i in mine], drives.scale[mine]
@@ -211,8 +215,9 @@ def _add_servos(spec: Any, robot: Robot, drives: Drives, servo: Servo, dt: float
             act.trntype = mj.mjtTrn.mjTRN_TENDON
         kp, kv = gains[joint.name]
         if joint.name in motors:
-            hinge = spec.joint(joint.name)
-            hinge.armature = max(float(hinge.armature), MOTOR_ARMATURE * kv * dt)
+            for name in names:
+                hinge = spec.joint(name)
+                hinge.armature = max(float(hinge.armature), MOTOR_ARMATURE * kv * dt / float(np.square(scales).sum()))
         act.set_to_position(kp=kp, kv=kv)
         if joint.effort is not None:
             act.forcelimited, act.forcerange = mj.mjtLimited.mjLIMITED_TRUE, [-joint.effort, joint.effort]

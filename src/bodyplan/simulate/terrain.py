@@ -13,7 +13,7 @@ from bodyplan.robot.model import Robot
 from bodyplan.robot.neighbours import separate_contacts
 from bodyplan.simulate.friction import DEFAULT, Balls, Friction, Runners, Scales, pair_friction
 from bodyplan.simulate.library import mujoco
-from bodyplan.simulate.wheels import GRIP, TIP_STEPS, TIPS, tip_names
+from bodyplan.simulate.wheels import TIPS, tip_names
 from bodyplan.spatial.rotations import rotate
 
 #: time constant of a contact in time steps. MuJoCo's default of 20 ms lets loaded contacts creep along the ground, by
@@ -61,11 +61,9 @@ def add_pairs(
 ) -> None:
     """Explicit pairs of every contact with every solid, named "contact on solid"; of a rim with a drive, of every of
     its ``tips`` balls."""
-    dt = spec.option.timestep
+    solref = [CONTACT_STEPS * spec.option.timestep, 1.0]
     for contact in robot.contacts:
-        shapes, options = [contact.name], {"solref": [CONTACT_STEPS * dt, 1.0]}
-        if contact.drive is not None:
-            shapes, options = tip_names(contact.name, tips), {"solref": [TIP_STEPS * dt, 1.0], "solimp": list(GRIP)}
+        shapes = [contact.name] if contact.drive is None else tip_names(contact.name, tips)
         for solid in solids:
             along, across = pair_friction(solid, contact, friction)
             if isinstance(friction, Friction) and solid.role == "floor":
@@ -83,7 +81,7 @@ def add_pairs(
                     geomname2=geom_name(solid),
                     condim=3,
                     friction=[along, across, 0.0, 0.0, 0.0],
-                    **options,
+                    solref=solref,
                 )
 
 

@@ -23,13 +23,18 @@ TIPS = 32
 #: armature of all slides of a ring over the robot's mass: no weight, no load of the motor at rest; ties and contacts of
 #: a light tip get the stiffness of a heavier one
 SLIDE_ARMATURE = 0.02
-#: time constants of ties and of contacts of tips in time steps, and impedances (solimp) of both: with MuJoCo's own a
-#: light tip sinks by centimetres under the load of a wheel
-TIE_STEPS, TIP_STEPS = 2.0, 4.0
-TIE, GRIP = (0.999, 0.999, 1e-3, 0.5, 2.0), (0.99, 0.999, 1e-3, 0.5, 2.0)
-#: least armature of an adjust motor over kv dt. The servo's damping is integrated implicitly, ties do not know of it:
-#: a hinge lighter than that takes up less than a tie pushes, and the wheel shakes itself to pieces
-MOTOR_ARMATURE = 2.0
+#: time constant of ties in time steps, and their impedance (solimp): with MuJoCo's own a light tip sinks by centimetres
+#: under the load of a wheel
+TIE_STEPS, TIE = 2.0, (0.999, 0.999, 1e-3, 0.5, 2.0)
+#: contacts of rims: time constant in time steps, impedance that it is meant for, and softness, that is acceleration per
+#: load, over 1 / mass of the robot. See :func:`soften`
+RIM_STEPS, RIM_IMPEDANCE, RIM_SOFTNESS = 2.0, 0.9, 50.0
+#: how much stiffer contacts of rims are along the ground than across it: they creep down a slope of 10 % by 0.1 mm/s
+RIM_IMPRATIO = 100.0
+#: least armature of a wheel's motors over kv dt. A servo's damping is integrated implicitly, ties and contacts do not
+#: know of it: on a lighter hinge they push more than it takes up, a ring shakes itself to pieces and a wheel that slips
+#: chatters with a part of its friction
+MOTOR_ARMATURE = 4.0
 RUBBER = (0.2, 0.2, 0.22, 1.0)
 
 
@@ -86,18 +91,19 @@ class Wheels:
 
     ``slides`` (K,) places in qpos of all slides, ``columns`` (K,) the column of q that each follows by ``laws``
     (K, 5). ``pointers`` the joints that are outcomes; ``axles`` (P,) the bodies that they turn about, and ``geoms``
-    the shapes of their rims. ``rings`` what the wheels were made from, ``tips`` of each; ``dt`` s the time step.
+    the shapes of their rims. ``rings`` what the wheels were made from, ``tips`` of each; ``shapes`` names of the shapes
+    of all rims.
     """
 
     rings: tuple[Ring, ...]
     tips: int
+    shapes: tuple[str, ...]
     slides: IntArray
     columns: IntArray
     laws: Array
     pointers: tuple[Pointer, ...]
     axles: IntArray
     geoms: tuple[IntArray, ...]
-    dt: float
 
     @classmethod
     def of(cls, model: Any, robot: Robot, rings: Sequence[Ring], tips: int) -> Wheels:
@@ -114,6 +120,7 @@ class Wheels:
         return cls(
             tuple(rings),
             tips,
+            tuple(name for some in shapes.values() for name in some),
             np.array(slides, dtype=np.int64),
             np.array(columns, dtype=np.int64),
             np.reshape(laws, (-1, 5)),
@@ -123,7 +130,6 @@ class Wheels:
                 np.array([model.geom(shape).id for rim in pointer.rims for shape in shapes[rim]], dtype=np.int64)
                 for pointer in pointers
             ),
-            float(model.opt.timestep),
         )
 
     def slide(self, q: Array) -> Array:
@@ -137,7 +143,8 @@ class Wheels:
     def directions(self, data: Any) -> Array:
         """(P,) rad: where each rim touches, seen from its axle, from the axle's x about its z: against the mean normal,
         weighted by load, of all its contacts. NaN where it carries nothing. A wheel's touching ball jumps from one to
-        the next; the normals of the ground do not."""
+        the next, the normals of the ground do not; those of a height field are of its facets, and off by some degrees
+        from record to record."""
         out = np.full(len(self.pointers), np.nan)
         count = data.ncon
         if not count or not len(out) or not data.nefc:  # shapes may just meet and not push yet
@@ -166,13 +173,38 @@ class Wheels:
     def settings(self) -> dict[str, Any]:
         """What to say of the wheels in a trial."""
         if not self.rings:
-            return {}
+            return {"rim_contact_steps": RIM_STEPS} if self.shapes else {}
         return {
+            "rim_contact_steps": RIM_STEPS,
             "rim_tips": self.tips,
-            "rim_contact_time": TIP_STEPS * self.dt,
             "rim_law_error_m": max(ring.error for ring in self.rings),
             "rim_law_range": {ring.joint: [ring.low, ring.high] for ring in self.rings},
         }
+
+
+def soften(spec: Any, model: Any, shapes: Sequence[str]) -> None:
+    """Set the contacts of the named ``shapes`` of rims with the ground, in a compiled model and in its spec.
+
+    A wheel that is dragged sideways must give way downwards. MuJoCo keeps a sliding contact on the boundary of its dual
+    cone: at a slip v it is held up against mu b v by the softness R of the contact times its load, b = 2 / (d tc), so
+    that a contact at rest sinks by 2 mu v d tc for the slip v that it bears. A stiffer one leaves the ground and meets
+    it again, step by step; a wheel is light to turn, its friction stops it within one of these steps, far below mu
+    times the load, and a robot with parallel axles hardly turns at all. R is set here to the same for all shapes,
+    heavy or light, by their impedance; time constant and damping go with it, so that each contact has b and stiffness
+    of one with impedance d = 0.9 and tc = 2 time steps: it sinks by 0.5 mm and bears about 0.1 m/s.
+    """
+    geoms = {model.geom(shape).id for shape in shapes}
+    softness = RIM_SOFTNESS / float(model.body_mass.sum())
+    time = RIM_STEPS * spec.option.timestep
+    for i in range(model.npair):
+        pair = int(model.pair_geom1[i]), int(model.pair_geom2[i])
+        if not geoms.isdisjoint(pair):
+            inverse = float(sum(model.body_invweight0[model.geom_bodyid[geom], 0] for geom in pair))
+            d = inverse / (inverse + softness)
+            solref, solimp = [RIM_IMPEDANCE * time / d, float(np.sqrt(d / RIM_IMPEDANCE))], [d, d, 1e-3, 0.5, 2.0]
+            model.pair_solref[i], model.pair_solimp[i] = solref, solimp
+            kept = spec.pair(model.pair(i).name)
+            kept.solref, kept.solimp = solref, solimp
 
 
 def wheel_servos(robot: Robot) -> dict[str, tuple[float, float]]:
