@@ -27,8 +27,9 @@ STEP_TIME, STRIDE = 3.0, 0.35
 #: share of the time in which some leg swings, if joints are fast enough: they have ROOM below their limits on level
 #: ground; and what the share may be where they are not
 SWINGING, ROOM, BOUNDS = 0.6, 0.85, (0.4, 0.85)
-#: height of the body and outward reach of the feet, as shares of a leg
-HEIGHT, REACH = 0.385, 0.333
+#: shares of a leg: height of the body and outward reach of the feet; height of a step, support margin and radius of a
+#: search for footholds (50, 20 and 50 mm for SILO4's 540 mm)
+HEIGHT, REACH, STEP_HEIGHT, MARGIN, SEARCH = 0.385, 0.333, 5.0 / 54.0, 2.0 / 54.0, 5.0 / 54.0
 
 
 class Crawl(Gait):
@@ -44,11 +45,12 @@ class Crawl(Gait):
 
     ``sway``: "auto", or the share (0: none) of the way from where the body would be to the centroid of the feet that
     stand. ``stability``: how much sway "auto" takes: "margin", the least that keeps the centre of mass ``margin`` m
-    inside the support all the time of a swing; "barrier", the most of the sum of logarithms of the distances from the
-    edges less a cost of sway; "most", the largest margin.
+    (default 0.037 of a leg) inside the support all the time of a swing; "barrier", the most of the sum of logarithms of
+    the distances from the edges less a cost of sway; "most", the largest margin.
 
-    ``step_height`` m of a swing over its straight line; more where the ground demands it. ``foothold``: "nearest" to
-    where the foot should be, or "search" within ``search_radius`` m for ground no steeper than ``max_slope`` rad.
+    ``step_height`` m of a swing over its straight line (default 0.093 of a leg); more where the ground demands it.
+    ``foothold``: "nearest", where the foot should be, or "search" within ``search_radius`` m (default 0.093 of a leg)
+    for ground no steeper than ``max_slope`` rad, if it can be with neither riser nor edge within the foot's radius.
     ``height`` m of the body's frame over the feet's plane (default 0.385 of a leg), ``reach`` m of the feet outward
     from their legs' roots (default 0.333). ``body``: "level", or "follow" the plane of the feet. ``start`` (x, y) m and
     ``heading`` rad at time 0.
@@ -79,15 +81,15 @@ class Crawl(Gait):
         velocity: Sequence[float] = (0.01, 0.0),
         yaw_rate: float = 0.0,
         *,
-        step_height: float = 0.05,
+        step_height: float | None = None,
         cycle_time: float | None = None,
         duty: float | None = None,
         sequence: Sequence[str] | None = None,
         sway: Any = "auto",
         stability: str = "margin",
-        margin: float = 0.02,
+        margin: float | None = None,
         foothold: str = "nearest",
-        search_radius: float = 0.05,
+        search_radius: float | None = None,
         max_slope: float = 0.6,
         height: float | None = None,
         reach: float | None = None,
@@ -100,7 +102,7 @@ class Crawl(Gait):
             raise InputError(f"velocity: expected (ahead, left) in m/s, and 0 if there is a third, got {velocity!r}.")
         self.velocity = (float(given[0]), float(given[1]))
         self.yaw_rate = number(yaw_rate, "yaw_rate")
-        self.step_height = number(step_height, "step_height", above=0.0)
+        self.step_height = None if step_height is None else number(step_height, "step_height", above=0.0)
         self.cycle_time = None if cycle_time is None else number(cycle_time, "cycle_time", above=0.0)
         self.duty = None if duty is None else number(duty, "duty", above=0.0, below=1.0)
         self.sequence: tuple[str, ...] | None = None
@@ -123,8 +125,8 @@ class Crawl(Gait):
             if value not in valid:
                 raise UnknownNameError(name, value, valid)
         self.stability, self.foothold, self.body = stability, foothold, body
-        self.margin = number(margin, "margin")
-        self.search_radius = number(search_radius, "search_radius", above=0.0)
+        self.margin = None if margin is None else number(margin, "margin")
+        self.search_radius = None if search_radius is None else number(search_radius, "search_radius", above=0.0)
         self.max_slope = number(max_slope, "max_slope", above=0.0, below=0.5 * np.pi)
         self.height = None if height is None else number(height, "height", above=0.0)
         self.reach = None if reach is None else number(reach, "reach")
@@ -155,17 +157,6 @@ class Crawl(Gait):
             "heading": self.heading,
         }
 
-    def order(self, names: Sequence[str]) -> list[int]:
-        """Numbers of the legs in the order in which they swing. InputError where ``sequence`` is not all of them."""
-        if self.sequence is None:
-            return list(range(len(names)))
-        for name in self.sequence:
-            if name not in names:
-                raise UnknownNameError("leg", name, names, where="Crawl: sequence")
-        if sorted(self.sequence) != sorted(names):
-            raise InputError(f"Crawl: sequence must name every leg once, got {list(self.sequence)!r}.")
-        return [list(names).index(name) for name in self.sequence]
-
     def planner(self, robot: Robot, ground: Ground) -> Planner:
         """The planner for one robot and ground."""
         duty = _paced(self, robot) if self.duty is None else self.duty
@@ -188,10 +179,6 @@ class Crawl(Gait):
             )
         offsets[:, :2] *= ((out + reach) / out)[:, None]
         offsets[:, 2] = 0.0
-        gait = self
-        if self.sequence is None:
-            names = [legs.names[j] for j in self._rear_to_front(legs.roots)]
-            gait = Crawl(**({k: v for k, v in self.to_dict().items() if k != "kind"} | {"sequence": names}))
         cycle = self._cycle(size, float(np.linalg.norm(offsets[:, :2], axis=1).max()), len(legs))
         swing = (1.0 - duty) * cycle
         sway = cycle / len(legs) - swing
@@ -200,18 +187,41 @@ class Crawl(Gait):
                 f"duty: {len(legs)} legs that swing one by one need more than {1.0 - 1.0 / len(legs):.4g}, got {duty}."
             )
         course = Course(self.velocity, self.yaw_rate, self.start, self.heading)
-        return Planner(gait, legs, ground, course, sway, swing, height, offsets)
+        search = SEARCH * size if self.search_radius is None else self.search_radius
+        return Planner(
+            self,
+            legs,
+            ground,
+            course,
+            order=self._order(legs),
+            sway_time=sway,
+            swing_time=swing,
+            height=height,
+            lift=STEP_HEIGHT * size if self.step_height is None else self.step_height,
+            margin=MARGIN * size if self.margin is None else self.margin,
+            search=search if self.foothold == "search" else 0.0,
+            offsets=offsets,
+        )
 
-    def _rear_to_front(self, roots: Array) -> list[int]:
-        """Legs from the rear to the front on the left, then on the right, as seen in the direction of travel."""
+    def _order(self, legs: Legs) -> tuple[int, ...]:
+        """Numbers of the legs in the order in which they swing: as ``sequence`` says, or from the rear to the front on
+        the left, then on the right, as seen in the direction of travel. InputError where ``sequence`` is not all."""
+        if self.sequence is not None:
+            for name in self.sequence:
+                if name not in legs.names:
+                    raise UnknownNameError("leg", name, legs.names, where="Crawl: sequence")
+            if sorted(self.sequence) != sorted(legs.names):
+                raise InputError(f"Crawl: sequence must name every leg once, got {list(self.sequence)!r}.")
+            return tuple(legs.names.index(name) for name in self.sequence)
         vx, vy = self.velocity
+        x, y, _ = legs.roots.T
         if abs(vy) > abs(vx):
-            along, left = np.sign(vy) * roots[:, 1], -np.sign(vy) * roots[:, 0]
+            along, left = np.sign(vy) * y, -np.sign(vy) * x
         else:
             sign = -1.0 if vx < 0.0 else 1.0
-            along, left = sign * roots[:, 0], sign * roots[:, 1]
-        slack = 1e-9 * float(np.abs(roots).max())
-        return [int(j) for j in np.lexsort((along, left < -slack))]
+            along, left = sign * x, sign * y
+        slack = 1e-9 * float(np.abs(legs.roots).max())
+        return tuple(int(j) for j in np.lexsort((along, left < -slack)))
 
     def _size(self, legs: Legs) -> float:
         """Mean length of the legs, m."""

@@ -63,9 +63,9 @@ def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float
     residual = np.linalg.norm(planner.legs.feet(q) - seen, axis=-1).max(axis=1)
     status = np.full(len(t), Status.OK.value, dtype="U24")
     limits = robot.limits
-    beyond = np.asarray(np.any((q < limits[:, 0] - EXACT) | (q > limits[:, 1] + EXACT), axis=1))
+    beyond = (q < limits[:, 0] - EXACT) | (q > limits[:, 1] + EXACT)
     fast = np.abs(qd) / robot.rates
-    status[beyond | (fast > 1.0 + EXACT).any(axis=1)] = Status.LIMIT.value
+    status[beyond.any(axis=1) | (fast > 1.0 + EXACT).any(axis=1)] = Status.LIMIT.value
     status[~solved] = Status.OUT_OF_REACH.value
     if plan.status != Status.OK:
         status[t >= plan.time - 1e-12] = plan.status.value
@@ -93,7 +93,7 @@ def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float
         torques=None if held is None else held.torques,
         facts=_facts(planner, plan, qd, period) | ({} if held is None else {"peak_holding_torque": held.peak}),
         stages=tuple(_stages(planner, plan, period)),
-        notes=tuple(_notes(planner, plan, t, beyond, fast, solved)),
+        notes=tuple(_notes(planner, plan, t, beyond, fast, ~placed)),
     )
 
 
@@ -187,7 +187,7 @@ def _claims(planner: Planner, plan: Plan, t: Array, heights: Array, period: floa
                         "tolerance": EXACT}  # fmt: skip
                 out.append(Claim("lifted", f"swinging feet clear of the ground: {stage}", data))
     if planner.legs.robot.mass > 0.0:
-        asked = planner.gait.margin - BETWEEN if planner.gait.sway == "auto" else 0.0
+        asked = planner.margin - BETWEEN if planner.gait.sway == "auto" else 0.0
         out.append(Claim("supported", "the centre of mass is over the standing feet", {"required": asked}))
     if period is not None and plan.status == Status.OK:
         turn = planner.course.yaw_rate * period
@@ -223,22 +223,29 @@ def _facts(planner: Planner, plan: Plan, qd: Array, period: float | None) -> dic
     return out
 
 
-def _notes(planner: Planner, plan: Plan, t: Array, beyond: BoolArray, fast: Array, solved: BoolArray) -> list[str]:
+def _notes(planner: Planner, plan: Plan, t: Array, beyond: BoolArray, fast: Array, lost: BoolArray) -> list[str]:
     notes = [
         "Feet that stand are fixed points: the joints follow from them and the body by exact inverse kinematics, so "
         "that nothing drifts (open-loop rates, as in the paper, slip by millimetres a minute).",
-        "The centre of mass is that of the whole robot with its swinging leg; (19)-(22) put it at the body's frame.",
+        "The centre of mass is that of the whole robot with its swinging leg; (19)-(22) put it at the body's frame."
+        if planner.legs.robot.mass > 0.0
+        else "The robot has no mass: its centre of mass is put at the body's frame, as in (19)-(22).",
     ]
     if plan.status != Status.OK:
         notes.append(f"Stops at {plan.time:.4g} s: {plan.reason}.")
-    for rows, what in ((~solved, "a foot is out of reach"), (beyond, "a joint is beyond its limits")):
-        if rows.any() and plan.status == Status.OK:
-            notes.append(f"From {t[int(rows.argmax())]:.4g} s on {what} ({int(rows.sum())} samples).")
+    for where, names, what in (
+        (lost, planner.legs.names, "cannot reach its foothold or its way"),
+        (beyond, planner.legs.robot.joints, "is beyond its limits"),
+    ):
+        if where.any():
+            first = int(where.any(axis=1).argmax())
+            name, count = names[int(where[first].argmax())], int(where.any(axis=1).sum())
+            notes.append(f"From {t[first]:.4g} s on {name} {what} ({count} samples).")
     if (fast > 1.0 + EXACT).any():
         k, j = np.unravel_index(int(fast.argmax()), fast.shape)
         notes.append(
             f"{planner.legs.robot.joints[j]} is {fast[k, j]:.3g} times as fast as it may be at {t[k]:.4g} s: a slower "
-            "walk, a lower step_height or a smaller duty (longer swings) helps."
+            f"walk (about {100.0 / fast[k, j]:.2g} % of the speed), a lower step_height or another duty helps."
         )
     if plan.steps and planner.gait.sway != "auto" and min(step.margin for step in plan.steps) < 0.0:
         worst = min(plan.steps, key=lambda step: step.margin)

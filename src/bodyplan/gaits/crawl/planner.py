@@ -59,16 +59,22 @@ class _Failure:
 
 @dataclass
 class Planner:
-    """Plans ``gait`` for ``legs`` on ``ground``."""
+    """Plans ``gait`` for ``legs`` on ``ground``, with the gait's numbers for this robot: ``order`` of the legs, s of
+    sway and swing, m of ``height``, ``lift``, ``margin`` and ``search`` (0: none), and ``offsets`` (m, 3) m of the feet
+    from the middle of the body, in its heading, on level ground."""
 
     gait: Crawl
     legs: Legs
     ground: Ground
     course: Course
+    order: tuple[int, ...]
     sway_time: float
     swing_time: float
     height: float
-    offsets: Array  # (m, 3) of the feet from the middle of the body, in its heading, on level ground
+    lift: float
+    margin: float
+    search: float
+    offsets: Array
     guess: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -89,17 +95,16 @@ class Planner:
                 f"{MOST_STEPS} allowed: a slower walk, a longer cycle_time, or a shorter time."
             )
         count = len(self.legs)
-        order = self.gait.order(self.legs.names)
         feet, failure = np.zeros((count, 3)), _Failure()
-        for place, leg in enumerate(order):
+        for place, leg in enumerate(self.order):
             feet[leg], why = self._foothold(leg, place - count)
             if why:
                 reason = f"{self.legs.names[leg]} has no foothold to begin on: {why}"
                 failure = _Failure(Status.NO_CONTACT, reason, 0.0)
-        first, begun = self._before(order[-1], feet), feet
+        first, begun = self._before(self.order[-1], feet), feet
         steps: list[Step] = []
         while failure.status == Status.OK and len(steps) * self.step_time < until:
-            step = self._step(order[len(steps) % count], len(steps), feet)
+            step = self._step(self.order[len(steps) % count], len(steps), feet)
             if isinstance(step, _Failure):
                 failure = step
             else:
@@ -113,8 +118,8 @@ class Planner:
         before = feet.copy()
         spot, why = self._foothold(leg, -1 - len(self.legs))
         before[leg] = feet[leg] if why else spot
-        shape = clear_swing(self.ground, before[leg], feet[leg], self.gait.step_height, self.legs.legs[leg].radius)
-        pose, _, _, _ = self._body(leg, -1, before, feet, shape or (self.gait.step_height, 1.0))
+        shape = clear_swing(self.ground, before[leg], feet[leg], self.lift, self.legs.legs[leg].radius)
+        pose, _, _, _ = self._body(leg, -1, before, feet, shape or (self.lift, 1.0))
         return pose
 
     def _step(self, leg: int, n: int, feet: Array) -> Step | _Failure:
@@ -126,7 +131,7 @@ class Planner:
         if why:
             return _Failure(Status.NO_CONTACT, f"{name} finds no foothold at {lift_off:.4g} s: {why}", begin)
         radius = self.legs.legs[leg].radius
-        shape = clear_swing(self.ground, feet[leg], after[leg], self.gait.step_height, radius)
+        shape = clear_swing(self.ground, feet[leg], after[leg], self.lift, radius)
         if shape is None:
             return _Failure(Status.BELOW_FLOOR, f"{name} cannot swing over the ground at {lift_off:.4g} s", begin)
         pose, margin, share, reached = self._body(leg, n, feet, after, shape)
@@ -135,9 +140,9 @@ class Planner:
             what = "its way" if lost == name else f"where {lost} stands"
             reason = f"{what} is out of reach while {name} swings at {lift_off:.4g} s"
             return _Failure(Status.OUT_OF_REACH, reason, begin)
-        if margin < self.gait.margin - EXACT and self.gait.sway == "auto":
+        if margin < self.margin - EXACT and self.gait.sway == "auto":
             reason = (
-                f"no sway gives {self.gait.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
+                f"no sway gives {self.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
                 f"most is {margin:.4g} m"
             )
             if len(self.legs) == 3:
@@ -157,7 +162,7 @@ class Planner:
             nominal,
             self.legs.legs[leg].radius,
             self.gait.max_slope,
-            self.gait.search_radius if self.gait.foothold == "search" else 0.0,
+            self.search,
         )
 
     def _body(
@@ -198,7 +203,7 @@ class Planner:
         margin; if it can be with all joints ``within`` their limits."""
         if not good.any():
             return 0  # no sway at all
-        enough = good & (least >= self.gait.margin - EXACT)
+        enough = good & (least >= self.margin - EXACT)
         wanted = barrier if self.gait.stability == "barrier" else least
         for mine in (enough & within, enough):
             if mine.any():
