@@ -74,6 +74,7 @@ def leg_rates(
     """
     (x, z), (vx, vz), (ax, az) = chord, velocity, acceleration
     square = x * x + z * z
+    square = np.where(square > 0.0, square, 1.0)  # a chord of no length has no direction and turns nowhere
     first = 2.0 * (x * vx + z * vz)
     second = 2.0 * (vx * vx + vz * vz + x * ax + z * az)
     s, c = np.maximum(found.short, 0.0), np.maximum(found.folded, 0.0)
