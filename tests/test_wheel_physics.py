@@ -155,6 +155,7 @@ def test_rolling_straight_on_a_plane() -> None:
     assert trial.height_max is not None and trial.height_max <= 5e-3
     assert trial.tilt is not None and trial.tilt <= 0.3 * DEGREE
     assert trial.sideways is not None and abs(trial.sideways[0]) < 1e-3
+    assert trial.yaw_ratio is None
     rolling = trial.t > trial.start_time + 0.6
     for wheel, share in (("fl", 0.25), ("fr", 0.25), ("r", 0.5)):
         torque = column(trial, f"{wheel}.adjust", "torque")[rolling]
@@ -236,7 +237,9 @@ def test_three_parallel_axles_of_equal_friction_make_a_fifth_of_a_turn(friction:
     share = 0.6**2 / (0.6**2 + (2.0 * 0.6) ** 2)
     motion = circling(bp.tri_wheel(), turn_radius, 0.2, 4.0, ahead=0.0)
     trial = bp.simulate(motion, friction=friction, settle=0.5, ramp=0.5)
-    assert trial.ok and trial.warnings == ()
+    (warning,) = trial.warnings
+    assert warning.startswith("cannot turn: 2") and "parallel" in warning
+    assert trial.yaw_ratio is not None and trial.yaw_ratio == pytest.approx(share, rel=0.1)
     some = trial.t > 2.0
     rate = np.polyfit(trial.t[some], yaw_of(trial)[some], 1)[0]
     assert rate * turn_radius / 0.2 == pytest.approx(share, rel=0.05)
@@ -251,6 +254,7 @@ def test_with_a_slippery_rear_wheel_the_front_axle_follows_a_circle() -> None:
     assert trial.ok and trial.warnings == ()
     assert trial.turned is not None and abs(trial.turned[-1]) < 4.0 * DEGREE
     assert abs(yaw_of(trial)[-1] - 0.8) < 4.0 * DEGREE
+    assert trial.yaw_ratio == pytest.approx(1.0, abs=4.0 * DEGREE / 0.8)
     executed, planned = (
         b[:2] + 0.6 * np.array([b[3] ** 2 - b[6] ** 2, 2.0 * b[3] * b[6]]) for b in (trial.base[-1], motion.base[-1])
     )

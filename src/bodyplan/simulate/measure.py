@@ -19,6 +19,9 @@ from bodyplan.spatial.rotations import conjugate, multiply, rotate
 
 #: planned advance a cycle below which a motion is not meant to go anywhere, m
 NOWHERE = 1e-9
+#: planned turn below which a motion is not meant to turn, rad, and horizontal part of the base's x axis below which it
+#: has no heading
+STRAIGHT, NO_HEADING = 0.1, 0.1
 
 
 class Meter:
@@ -151,6 +154,21 @@ def turned_of(
         # turning by the double angle makes q and -q one, and means of angles well defined
         out[cycle] = np.angle(np.sum((w + 1j * z) ** 2))
     return out
+
+
+def yaw_ratio_of(records: Records, reference: Reference, phase: Callable[[Array], Array], start: float) -> float | None:
+    """Turn of the base about z from ``start`` s to the end, executed over planned; None where less than
+    :data:`STRAIGHT` is planned, or where the base's x axis comes near the vertical."""
+    some = records.t >= start - 1e-9
+    ways = []
+    for base in (records.base[some], reference.bases(phase(records.t[some]))):
+        x, y, _ = rotate(base[:, 3:], np.array([1.0, 0.0, 0.0])).T
+        if np.hypot(x, y).min(initial=np.inf) < NO_HEADING:
+            return None
+        heading = np.unwrap(np.arctan2(y, x))
+        ways.append(float(heading[-1] - heading[0]))
+    executed, planned = ways
+    return executed / planned if abs(planned) >= STRAIGHT else None
 
 
 def directions(planned: Array) -> Array:

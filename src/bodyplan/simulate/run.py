@@ -23,13 +23,14 @@ from bodyplan.simulate.measure import (
     slips_of,
     tilt_of,
     turned_of,
+    yaw_ratio_of,
 )
 from bodyplan.simulate.model import Physics, Servo, build
 from bodyplan.simulate.reference import Reference, region
 from bodyplan.simulate.start import Walls, on_the_floor
 from bodyplan.simulate.terrain import CONTACT_STEPS
 from bodyplan.simulate.trial import Trial
-from bodyplan.simulate.wheels import TIPS
+from bodyplan.simulate.wheels import TIPS, turning_remarks
 
 #: most time steps of one run: a mistyped dt should not eat the machine
 MOST_STEPS = 50_000_000
@@ -130,6 +131,7 @@ def simulate(
         weight = float(physics.model.body_mass.sum()) * float(np.linalg.norm(physics.model.opt.gravity))
         measures |= {
             "turned": turned_of(records, reference, timing.phase, start, period, cycles),
+            "yaw_ratio": yaw_ratio_of(records, reference, timing.phase, start),
             "slip_angle": run.sliding.angle,
             "tilt": tilt_of(records, reference, timing.phase, start),
             **dict(zip(("height_rms", "height_max"), height_of(records, reference, timing.phase, start), strict=True)),
@@ -151,6 +153,7 @@ def simulate(
         warnings=(
             *_remarks_on(motion),
             *run.warnings(),
+            *turning_remarks(motion.robot, measures.get("yaw_ratio")),
             *(f"MuJoCo: {text}" for text in dict.fromkeys(remarks)),
         ),
         settings=_settings(physics, timing, floor, walls)

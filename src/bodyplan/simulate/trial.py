@@ -63,7 +63,7 @@ class Trial:
     is planned. ``sideways`` (cycles,) m: horizontal, positive to the left of the planned direction.
     ``speed`` m/s: mean, along the planned direction. ``turned`` (cycles,) rad in (-pi, pi]: how far the base is
     turned about z from the planned one, mean over each cycle: a body may swing round while it starts and then keep
-    its heading. ``tilt`` rad: largest angle between the planned and the executed z axis of the base. ``slips`` and
+    its heading. ``yaw_ratio``: turn of the base about z, executed over planned; None where less than 0.1 rad is planned. ``tilt`` rad: largest angle between the planned and the executed z axis of the base. ``slips`` and
     ``lifts``: see :class:`Slip` and :class:`Lift`.
 
     ``slip_angle`` rad in [0, pi/2]: atan2(sum of \\|v across\\|, sum of \\|v along\\|) of the velocities of the middles
@@ -96,6 +96,7 @@ class Trial:
     sideways: Array | None = None
     speed: float | None = None
     turned: Array | None = None
+    yaw_ratio: float | None = None
     tilt: float | None = None
     height_rms: float | None = None
     height_max: float | None = None
@@ -176,6 +177,7 @@ class Trial:
             "advance_ratio": self.advance_ratio,
             "forward_ratio": self.forward_ratio,
             "turned_rad": None if self.turned is None else float(self.turned[-1]),
+            "yaw_ratio": self.yaw_ratio,
             "tilt_rad": self.tilt,
             "height_rms_m": self.height_rms,
             "height_max_m": self.height_max,

@@ -17,6 +17,7 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.robot.model import Robot
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.rims import Pointer, Ring, pointers_of, rims_of
+from bodyplan.spatial.rotations import rotate
 
 #: balls of a ring. Between two of them a wheel sinks by R (pi / TIPS)^2 / 2, 0.5 % of its radius
 TIPS = 32
@@ -35,6 +36,10 @@ RIM_IMPRATIO = 100.0
 #: know of it: on a lighter hinge they push more than it takes up, a ring shakes itself to pieces and a wheel that slips
 #: chatters with a part of its friction
 MOTOR_ARMATURE = 4.0
+#: share of the planned turn below which a robot on wheels cannot turn
+TURNS = 0.8
+#: sine of the angle between axles that are parallel; m between axles that are on one line
+PARALLEL = 1e-6
 RUBBER = (0.2, 0.2, 0.22, 1.0)
 
 
@@ -220,3 +225,22 @@ def wheel_servos(robot: Robot) -> dict[str, tuple[float, float]]:
                 kp = max(factor * size, out.get(joint, (0.0, 0.0))[0])
                 out[joint] = (kp, kp / 50.0)
     return out
+
+
+def turning_remarks(robot: Robot, yaw_ratio: float | None) -> list[str]:
+    """What to say of a robot on wheels that made so much of its planned turn (None: it planned none)."""
+    rims = rims_of(robot)
+    if yaw_ratio is None or yaw_ratio >= TURNS or not rims:
+        return []
+    rest = robot.forward(np.zeros(robot.n))
+    axes = np.array([rotate(rest[rim.axle][3:], np.array([0.0, 0.0, 1.0])) for rim in rims])
+    places = np.array([rest[rim.axle][:3] for rim in rims])
+    text = f"cannot turn: {100.0 * yaw_ratio:.0f} % of the planned yaw"
+    parallel = np.abs(np.cross(axes, axes[0])).max() < PARALLEL
+    # on one line the axles roll about any point of it
+    apart = np.abs(np.cross(places - places[0], axes[0])).max() > PARALLEL
+    if parallel and apart:
+        text += (
+            ": axles that are parallel, one behind the other, make wheels slip sideways, and their friction holds on"
+        )
+    return [text]
