@@ -36,10 +36,12 @@ SPOTS, CLOSER, ROUNDS = 20, 4, 2
 #: where among the spots that go those lie that are offered beside the farthest
 SHARES = (0.8, 0.55, 0.3, 0.0)
 #: places along a move at which it is tried, and those at which one that is kept is tried again
-PLACES, CLOSE = 33, 161
+PLACES, CLOSE = 25, 121
 #: shapes of a swing: what is added to its lift, in units of how far the ground on its way stands above its ends, and
 #: how early it rises
 SHAPES = ((0.0, 1.0), (0.0, 0.7), (0.0, 0.5), (0.0, 0.3), (1.0, 1.0), (1.0, 0.6), (1.6, 1.0), (1.6, 0.4))
+#: share of its height over a tread that a tail or head link keeps from the tread's edge
+OVER_EDGES = 0.9
 #: shares of a straight leg by which an anchor may be behind the place beyond an edge where the next one lands
 BRIDGES = (0.985, 0.95, 0.9)
 #: share of the mean link within which two stances count as alike
@@ -67,8 +69,9 @@ class Walker:
         """Anchors (..., N, 2) along and up, standing at s (..., N) m."""
         return np.stack([s, self.track.height(s) + self.snake.rest], axis=-1)
 
-    def tried(self, moves: Moves, places: Array) -> list[Status]:
-        """The first demand, floor or ceiling that each move runs into at ``places`` (p,) of tau, or ok."""
+    def tried(self, moves: Moves, places: Array, only: int | None = None) -> list[Status]:
+        """The first demand, floor or ceiling that each move runs into at ``places`` (p,) of tau, or ok. ``only``: the
+        one anchor that moves in all of them; what does not move with it has been tried before."""
         count, snake, size = len(moves), self.snake, float(self.snake.links.max())
         tau = np.broadcast_to(places, (count, len(places)))
         state = moves.state(snake.links, np.broadcast_to(np.arange(count)[:, None], tau.shape), tau)
@@ -76,28 +79,53 @@ class Walker:
             status: np.where(np.isnan(values), -np.inf, values).max(axis=(1, 2), initial=-np.inf)
             for status, values in self.demands.excess(state, moves.swinging[:, None]).items()
         }
-        points = state.points(snake.links)
-        known = np.isfinite(points).all(axis=(-2, -1))
-        floor, ceiling = np.full(tau.shape, -np.inf), np.full(tau.shape, -np.inf)
-        if known.any():
-            some = points[known]
-            whole = np.concatenate([some[:, :1] - [snake.tail, 0.0], some, some[:, -1:] + [snake.head, 0.0]], axis=1)
-            below, above, corner = self.track.gaps(np.stack([whole[:, :-1], whole[:, 1:]], axis=2))
-            feet = self.track.floor_gap(np.stack([some[:, 0::2], some[:, 0::2]], axis=2))
-            slack = 1e-12 * size
-            floor[known] = np.maximum(
-                np.maximum(snake.body - below.min(axis=1), snake.rest - feet.min(axis=1)) - slack,
-                snake.body + self.margin - corner.min(axis=1),
-            )
-            # links keep from the ceiling what the joints must: those are where it is nearest
-            ceiling[known] = snake.top + self.margin - above.min(axis=1)
-        found[Status.BELOW_FLOOR] = floor.max(axis=1) / size
+        floor, ceiling = np.full(count, -np.inf), np.full(count, -np.inf)
+        # only what the demands let pass is worth a look at the ground
+        rows = np.flatnonzero(np.max(list(found.values()), axis=0) <= MET)
+        if len(rows):
+            floor[rows], ceiling[rows] = self._reaches(state.points(snake.links)[rows], only)
+        found[Status.BELOW_FLOOR] = floor / size
         if self.crouch is not None:
             high = state.elbows(snake.links)[..., 1].max(axis=-1) - state.anchors[..., 1].min(axis=-1)
-            ceiling = np.maximum(ceiling, high - self._room(moves.before)[:, None])
-            ceiling[:, -1] = np.maximum(ceiling[:, -1], high[:, -1] - self._room(moves.after))
-        found[Status.ABOVE_CEILING] = np.maximum(found.get(Status.ABOVE_CEILING, -np.inf), ceiling.max(axis=1) / size)
+            ceiling = np.maximum(ceiling, (high - self._room(moves.before)[:, None]).max(axis=1))
+            ceiling = np.maximum(ceiling, high[:, -1] - self._room(moves.after))
+        found[Status.ABOVE_CEILING] = np.maximum(found.get(Status.ABOVE_CEILING, -np.inf), ceiling / size)
         return [next((s for s, most in found.items() if most[m] > MET), Status.OK) for m in range(count)]
+
+    def _reaches(self, points: Array, only: int | None) -> tuple[Array, Array]:
+        """How far (M,) m joints ``points`` (M, p, 2 N - 1, 2) and the links between them reach into the floor and its
+        edges, and into the ceiling, at any place."""
+        snake, joints = self.snake, points.shape[2]
+        first, last = (0, joints) if only is None else (max(0, 2 * only - 2), min(joints, 2 * only + 3))
+        body = [points[:, :, first:last]]
+        keep = np.full(last - first - 1, self.margin)
+        # tail and head links lie as low as the feet and may hang over an edge
+        low_link = min(self.margin, OVER_EDGES * max(snake.rest - snake.body, 0.0))
+        if first == 0 and (only is None or only == 0):
+            body.insert(0, points[:, :, :1] - [snake.tail, 0.0])
+            keep = np.append(low_link, keep)
+        if last == joints and (only is None or 2 * only == joints - 1):
+            body.append(points[:, :, -1:] + [snake.head, 0.0])
+            keep = np.append(keep, low_link)
+        whole = np.concatenate(body, axis=2)
+        feet = points[:, :, 0::2] if only is None else points[:, :, 2 * only : 2 * only + 1]
+        low, high = whole[..., 0].min(axis=(1, 2)), whole[..., 0].max(axis=(1, 2))
+        far = 2.0 * (snake.rest + snake.top + self.margin)
+        near = np.any((self.track.breaks >= low[:, None] - far) & (self.track.breaks <= high[:, None] + far), axis=1)
+        # where no step is near the floor is level under feet that rise, and the ceiling level over the highest joint
+        floor, ceiling = np.full(len(points), -np.inf), np.full(len(points), -np.inf)
+        top = whole[..., 1].max(axis=(1, 2)) + snake.top + self.margin
+        ceiling[~near] = top[~near] - self.track.ceiling_at(low[~near])
+        if near.any():
+            some = whole[near]
+            below, above, corner = self.track.gaps(np.stack([some[:, :, :-1], some[:, :, 1:]], axis=3))
+            standing = self.track.floor_gap(np.stack([feet[near], feet[near]], axis=3))
+            slack = 1e-12 * float(snake.links.max())
+            into = np.maximum(snake.body - below.min(axis=2), snake.rest - standing.min(axis=2)) - slack
+            floor[near] = np.maximum(into, (snake.body + keep - corner).max(axis=2)).max(axis=1)
+            # links keep from the ceiling what the joints must: those are where it is nearest
+            ceiling[near] = (snake.top + self.margin - above.min(axis=2)).max(axis=1)
+        return floor, ceiling
 
     def _room(self, anchors: Array) -> Array:
         """(M,) m: what the lowest place near anchors (M, N, 2) leaves above their line."""
@@ -128,9 +156,11 @@ class Walker:
         return Moves(before, after, lift, np.full((count, anchors), shape[1]), ("",) * count)
 
     def shaped(self, before: Array, after: Array, moving: IntArray) -> tuple[Moves, list[Status]]:
-        """Moves in the first shape that goes, with the first reason against the plainest where none does."""
+        """Moves of one and the same anchor in the first shape that goes, with the first reason against the plainest
+        where none does."""
         best = self.moves(before, after, moving, SHAPES[0])
-        status = self.tried(best, np.linspace(0.0, 1.0, PLACES))
+        only = int(moving[0])
+        status = self.tried(best, np.linspace(0.0, 1.0, PLACES), only)
         level = (before[np.arange(len(before)), moving, 1] == after[np.arange(len(before)), moving, 1]) & (
             self.rise(before, after, moving) <= 0.0
         )
@@ -140,7 +170,7 @@ class Walker:
             if not len(left):
                 break
             other = self.moves(before[left], after[left], moving[left], shape)
-            found = self.tried(other, np.linspace(0.0, 1.0, PLACES))
+            found = self.tried(other, np.linspace(0.0, 1.0, PLACES), only)
             for row in np.flatnonzero([s == Status.OK for s in found]):
                 m = left[row]
                 best.lift[m], best.early[m], status[m] = other.lift[row], other.early[row], Status.OK
@@ -368,7 +398,7 @@ def _landings(
     after = before.copy()
     after[:, i] = walker.stand(at)
     none = np.zeros(after.shape[:2])
-    stands = walker.tried(Moves(after, after, none, none + 1.0, ("",) * len(row)), np.zeros(1))
+    stands = walker.tried(Moves(after, after, none, none + 1.0, ("",) * len(row)), np.zeros(1), i)
     why.update((name, status) for status in stands if status != Status.OK)
     good = np.flatnonzero([status == Status.OK for status in stands])
     if not len(good):

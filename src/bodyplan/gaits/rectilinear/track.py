@@ -102,6 +102,12 @@ class Track:
             out = np.where((low < b) & (high > a), np.minimum(out, height), out)
         return out
 
+    def ceiling_at(self, s: Array) -> Array:
+        """Ceiling (...,) m at s; inf where it is open."""
+        if not isinstance(self.ground, Profile):
+            return np.full(np.shape(s), np.inf)
+        return self.ground.ceiling_height(self.origin[0] + s)
+
     def gaps(self, ends: Array) -> tuple[Array, Array, Array]:
         """Distances (...,) m of segments ``ends`` (..., 2, 2), along and up, from the floor, from the ceiling and from
         the nearest edge of the floor; inf where there is none."""
