@@ -63,8 +63,10 @@ class Trial:
     is planned. ``sideways`` (cycles,) m: horizontal, positive to the left of the planned direction.
     ``speed`` m/s: mean, along the planned direction. ``turned`` (cycles,) rad in (-pi, pi]: how far the base is
     turned about z from the planned one, mean over each cycle: a body may swing round while it starts and then keep
-    its heading. ``yaw_ratio``: turn of the base about z, executed over planned; None where less than 0.1 rad is planned. ``tilt`` rad: largest angle between the planned and the executed z axis of the base. ``slips`` and
-    ``lifts``: see :class:`Slip` and :class:`Lift`.
+    its heading. ``yaw_ratio``: turn of the base about z, executed over planned; None where less than 0.1 rad is
+    planned. ``tilt`` rad: largest angle between the planned and the executed z axis of the base. ``height_rms`` and
+    ``height_max`` m: root mean square and largest size of executed less planned z of the base, at the same phase of
+    the motion. ``slips`` and ``lifts``: see :class:`Slip` and :class:`Lift`.
 
     ``slip_angle`` rad in [0, pi/2]: atan2(sum of \\|v across\\|, sum of \\|v along\\|) of the velocities of the middles
     of those capsules that touch the ground, horizontal, across and along their axes, over the records of the
