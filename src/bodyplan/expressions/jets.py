@@ -1,7 +1,8 @@
 """Second-order forward-mode differentiation: value, gradient and Hessian carried through every operation.
 
 The rules are written once, for any kind of number: arrays give exact derivatives, intervals
-(:mod:`bodyplan.expressions.intervals`) give bounds of the derivatives over a box.
+(:mod:`bodyplan.expressions.intervals`) give bounds of the derivatives over a box, dual numbers
+(:mod:`bodyplan.expressions.duals`) their rates along a way.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ class ArrayMath:
 
 
 #: (math, v, f(v)) -> f'(v), f''(v)
-_DERIVATIVES: dict[str, Callable[[Any, Number, Number], tuple[Number, Number]]] = {
+DERIVATIVES: dict[str, Callable[[Any, Number, Number], tuple[Number, Number]]] = {
     "sin": lambda m, v, f: (m.cos(v), -f),
     "cos": lambda m, v, f: (-m.sin(v), -f),
     "tan": lambda m, v, f: (1.0 + m.square(f), 2.0 * f * (1.0 + m.square(f))),
@@ -118,7 +119,8 @@ _DERIVATIVES: dict[str, Callable[[Any, Number, Number], tuple[Number, Number]]] 
     "sqrt": lambda m, v, f: (0.5 / f, -0.25 / (f * v)),
     "abs": lambda m, v, f: (m.step(v), m.bend(v)),
 }
-_NUMPY_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}
+#: functions whose names in NumPy are others
+NUMPY_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}
 
 
 def run(tape: Sequence[Node], variables: Sequence[Jet], math: Math) -> list[Jet]:
@@ -162,8 +164,8 @@ def _apply(node: Node, args: list[Jet], math: Any) -> Jet:
             return _select(math.order(a.value, args[1].value), a, args[1], math)
         case "atan2":
             return _angle(a, args[1], math)
-    f = getattr(math, _NUMPY_NAMES.get(node.op, node.op))(a.value)
-    return _chain(a, f, *_DERIVATIVES[node.op](math, a.value, f), math) if a.gradient else Jet(f)
+    f = getattr(math, NUMPY_NAMES.get(node.op, node.op))(a.value)
+    return _chain(a, f, *DERIVATIVES[node.op](math, a.value, f), math) if a.gradient else Jet(f)
 
 
 def _chain(u: Jet, f: Number, f1: Number, f2: Number | None, math: Any) -> Jet:

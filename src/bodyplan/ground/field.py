@@ -40,6 +40,10 @@ class Field(Ground):
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         """Bounds of the height and its derivatives over boxes with corners (n, 2)."""
 
+    @abstractmethod
+    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
+        """Rate (n, 2, 2) of the Hessian at x, y (n,) for a point that moves by dx, dy (n,) a unit of time."""
+
     def field_creases(self) -> Sequence[JetFunction]:
         """Functions whose zeros are the lines where the ground has no derivative."""
         return ()

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, finite, frozen, number
 from bodyplan.errors import InputError, MissingExtraError
-from bodyplan.ground.base import Ground, check_arguments, coulomb
+from bodyplan.ground.base import Ground, check_arguments, coulomb, planar
 from bodyplan.ground.field import Field
 from bodyplan.ground.heightfiles import check_size, pair, read_grid
 from bodyplan.ground.nearest import Bounds
@@ -171,6 +171,12 @@ class HeightMap(Field):
     def field_box(self) -> Array:
         return self._box
 
+    def height(self, x: ArrayLike, y: ArrayLike | None = None) -> Array:
+        """Floor height z (...,) in m."""
+        bx, by = planar(x, y)
+        self._check_inside(bx, by)
+        return self._spline.value(bx.ravel() - self._origin[0], by.ravel() - self._origin[1]).reshape(bx.shape)
+
     def _jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         self._check_inside(x, y)
         z, g, h = self.field_jet(x.ravel(), y.ravel())
@@ -181,6 +187,9 @@ class HeightMap(Field):
 
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         return self._spline.bounds(low - self._origin, high - self._origin)
+
+    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
+        return self._spline.hessian_rate(x - self._origin[0], y - self._origin[1], dx, dy)
 
     def to_dict(self) -> dict[str, Any]:
         return {

@@ -38,11 +38,13 @@ _CERTAIN = float(np.sqrt(3.0) - 1.0)
 @dataclass(frozen=True)
 class Bounds:
     """What is known of f over n boxes: (lowest, highest) of f in ``z`` (2, n) and of its second derivatives
-    in ``hessian`` (2, n, 2, 2); ``change`` (n,) bounds the norm of its third derivatives (inf: unknown)."""
+    in ``hessian`` (2, n, 2, 2); ``change`` (n,) bounds the norm of its third derivatives (inf: unknown). ``gradient``
+    (2, n, 2): of its first derivatives, or None."""
 
     z: Array
     hessian: Array
     change: Array
+    gradient: Array | None = None
 
 
 class SmoothField(Protocol):

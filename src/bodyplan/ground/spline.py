@@ -44,16 +44,43 @@ class BicubicSpline:
 
     def jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Value (n,), gradient (n, 2) and Hessian (n, 2, 2) at x, y (n,); edge cells continue outwards."""
-        ny, nx = self.nodes.shape[:2]
-        u, v = x / self.step[0], y / self.step[1]
-        i = np.clip(np.floor(u), 0, nx - 2).astype(np.int64)
-        j = np.clip(np.floor(v), 0, ny - 2).astype(np.int64)
-        d = _hermite(v - j) @ self._cells(j, i) @ np.swapaxes(_hermite(u - i), -1, -2)
+        u, v, cells = self._at(x, y)
+        d = _hermite(v) @ cells @ np.swapaxes(_hermite(u), -1, -2)
         dx, dy = self.step
         gradient = np.stack([d[:, 0, 1] / dx, d[:, 1, 0] / dy], axis=-1)
         mixed = d[:, 1, 1] / (dx * dy)
         hessian = np.stack([d[:, 0, 2] / dx**2, mixed, mixed, d[:, 2, 0] / dy**2], axis=-1)
         return d[:, 0, 0] + self.level, gradient, hessian.reshape(-1, 2, 2)
+
+    def value(self, x: Array, y: Array) -> Array:
+        """Value (n,) at x, y (n,); that of :meth:`jet`, for less."""
+        u, v, cells = self._at(x, y)
+        return np.asarray(np.sum(np.sum(_weights(v)[:, :, None] * cells, axis=1) * _weights(u), axis=1) + self.level)
+
+    def hessian_rate(self, x: Array, y: Array, vx: Array, vy: Array) -> Array:
+        """Rate (n, 2, 2) of the Hessian at x, y (n,) for points that move by vx, vy (n,) a unit of time; third
+        derivatives jump between cells, those of the cell at hand count."""
+        u, v, cells = self._at(x, y)
+        across = np.concatenate([_hermite(v), np.broadcast_to(_THIRD, (len(v), 1, 4))], axis=1)
+        along = np.concatenate([_hermite(u), np.broadcast_to(_THIRD, (len(u), 1, 4))], axis=1)
+        d = across @ cells @ np.swapaxes(along, -1, -2)
+        dx, dy = self.step
+        xxx, xxy, xyy, yyy = (
+            d[:, 0, 3] / dx**3,
+            d[:, 1, 2] / (dx**2 * dy),
+            d[:, 2, 1] / (dx * dy**2),
+            d[:, 3, 0] / dy**3,
+        )
+        mixed = xxy * vx + xyy * vy
+        return np.stack([xxx * vx + xxy * vy, mixed, mixed, xyy * vx + yyy * vy], axis=-1).reshape(-1, 2, 2)
+
+    def _at(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """Places (n,) within cells, in cell lengths, and the Hermite data (n, 4, 4) of the cells."""
+        ny, nx = self.nodes.shape[:2]
+        u, v = x / self.step[0], y / self.step[1]
+        i = np.clip(np.floor(u), 0, nx - 2).astype(np.int64)
+        j = np.clip(np.floor(v), 0, ny - 2).astype(np.int64)
+        return u - i, v - j, self._cells(j, i)
 
     def bounds(self, low: Array, high: Array) -> Bounds:
         """Bounds over boxes with corners (n, 2): those of the control values of the cells around them."""
@@ -119,6 +146,10 @@ class BicubicSpline:
         return out
 
 
+#: third derivatives of the Hermite basis of :func:`_hermite`
+_THIRD = np.array([12.0, 6.0, -12.0, 6.0])
+
+
 def _slopes(values: Array, axis: int) -> Array:
     """Slopes at the samples of the not-a-knot cubic splines along ``axis``, for unit spacing."""
     from scipy.interpolate import CubicSpline
@@ -127,11 +158,17 @@ def _slopes(values: Array, axis: int) -> Array:
     return np.asarray(CubicSpline(where, values, axis=axis, bc_type="not-a-knot")(where, 1))
 
 
+def _weights(t: Array) -> Array:
+    """Hermite basis (value, slope at 0; value, slope at 1) at t (n,): (n, 4)."""
+    r = 1.0 - t
+    return np.stack([(1.0 + 2.0 * t) * r * r, t * r * r, t * t * (3.0 - 2.0 * t), -t * t * r], axis=1)
+
+
 def _hermite(t: Array) -> Array:
     """Hermite basis (value, slope at 0; value, slope at 1) with two derivatives at t (n,): (n, 3, 4)."""
     r = 1.0 - t
     out = np.empty((len(t), 3, 4))
-    out[:, 0] = np.stack([(1.0 + 2.0 * t) * r * r, t * r * r, t * t * (3.0 - 2.0 * t), -t * t * r], axis=1)
+    out[:, 0] = _weights(t)
     out[:, 1] = np.stack([-6.0 * t * r, r * (1.0 - 3.0 * t), 6.0 * t * r, t * (3.0 * t - 2.0)], axis=1)
     out[:, 2] = np.stack([12.0 * t - 6.0, 6.0 * t - 4.0, 6.0 - 12.0 * t, 6.0 * t - 2.0], axis=1)
     return out

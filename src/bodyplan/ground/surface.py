@@ -68,8 +68,11 @@ class Surface(Field):
         return self._expression.jet_or_nan(x=x, y=y)
 
     def field_bounds(self, low: Array, high: Array) -> Bounds:
-        z, _, hessian = self._expression.enclosure(x=(low[:, 0], high[:, 0]), y=(low[:, 1], high[:, 1]))
-        return Bounds(z, hessian, np.full(len(low), np.inf))
+        z, gradient, hessian = self._expression.enclosure(x=(low[:, 0], high[:, 0]), y=(low[:, 1], high[:, 1]))
+        return Bounds(z, hessian, np.full(len(low), np.inf), gradient)
+
+    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
+        return self._expression.jet_rates(x=(x, dx), y=(y, dy))[2]
 
     def field_creases(self) -> Sequence[JetFunction]:
         return [partial(_jet_of, kink) for kink in self._expression.kinks]
