@@ -114,18 +114,20 @@ def test_it_inches_under_a_ceiling_without_touching_it():
 
 
 def test_stairs_up_and_down():
-    ground = bp.Profile([(None, 0.0), (2.1, 0.03), (2.6, 0.0)], 0.30)
-    gait = bp.Rectilinear(5, schedule="two-phase", lift=0.03, ceiling=0.18)
+    ground = bp.Profile([(None, 0.0), (2.2, 0.03), (3.0, 0.0)], [(None, 0.22), (2.0, 0.25), (3.3, 0.22)])
+    # servos let the body sag by 6 mm: what lies low must be lifted over edges by more than that
+    gait = bp.Rectilinear(5, schedule="two-phase", lift=0.05)
     motion = plan(gait, snake(5), ground, until=24.0).raise_if_failed()
     report = bp.check(motion)
     assert report.ok, report
-    assert report["the centre of mass"].value > 0.1
+    assert report["the centre of mass"].value > 0.05
     # beyond the second edge with its head
     head = motion.poses()["link17"]
-    assert head[-1, 0] > 2.6 and head[:, 2].max() > 0.03
+    assert head[-1, 0] > 3.0 and head[:, 2].max() > 0.03
     run = trial(motion)
     assert 0.97 <= run.advance_ratio <= 1.03
-    assert run.tilt <= np.radians(3.0)
+    # as far as legs of soft servos lean when folded high; a snake that tips leans by much more
+    assert run.tilt <= np.radians(5.0)
 
 
 def test_steering_ends_with_the_wanted_heading_in_physics():
