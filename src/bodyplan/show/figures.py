@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bodyplan.errors import MissingExtraError
+from bodyplan.show.crawling import walk_figure
 from bodyplan.show.following_page import following_figure
 from bodyplan.show.grids import grid_figure
 from bodyplan.show.inching_figures import footholds, side_views
@@ -60,6 +61,7 @@ def figures(outcome: Outcome, playback: Playback) -> dict[str, Figure]:
         "slip_by_stage": slip_by_stage,
         "torque": torque,
         "curve_and_mechanism": lambda o, p: following_figure(p.following, new_figure),
+        "walk": lambda o, p: walk_figure(o.motion, new_figure),
         "side_views": lambda o, p: side_views(p.inching, new_figure),
         "footholds": lambda o, p: footholds(p.inching, new_figure),
         "contacts": lambda o, p: schedule_figure(p, new_figure),

@@ -1,0 +1,61 @@
+"""The report of a walk: where it stands, its figure, and what the null space buys."""
+
+import numpy as np
+import pytest
+
+import bodyplan as bp
+from bodyplan.gaits.crawl import null_space
+from bodyplan.show.crawling import crawling_plots, crawling_section, is_crawl, walk_figure
+
+
+@pytest.fixture(scope="module")
+def walk():
+    gait = bp.Crawl(velocity=(0.012, 0.0), cycle_time=12.0)
+    return bp.plan(bp.silo4(), gait, bp.Surface("0.02*sin(6*x)*cos(5*y)"), bp.times(0, 6, dt=0.05))
+
+
+@pytest.fixture(scope="module")
+def benefits():
+    gait = bp.Crawl(velocity=(0.012, 0.0), cycle_time=12.0)
+    return {row.choice: row for row in null_space(bp.silo4(), gait, bp.Plane(), 12.0)}
+
+
+def test_the_margin_is_said_and_drawn(walk):
+    page = crawling_section(walk, {"walk": "<svg></svg>"})
+    margin = bp.check(walk)["the centre of mass"].value
+    assert f"{1e3 * margin:.4g}" in page and "What the null space buys" in page
+    plot = crawling_plots(walk)["walk_margin"]
+    assert min(y for y in plot["data"][0]["y"] if y is not None) == pytest.approx(1e3 * margin, rel=1e-3)
+
+
+def test_the_figure_has_every_foothold(walk):
+    from matplotlib.figure import Figure
+
+    made = walk_figure(walk, lambda height: Figure(figsize=(8.0, height)))
+    labels = made.axes[0].get_legend_handles_labels()[1]
+    assert [label for label in labels if label.endswith(".foot")] == ["fl.foot", "fr.foot", "hl.foot", "hr.foot"]
+
+
+def test_other_gaits_have_no_such_part():
+    snake = bp.snake(12, 0.1, axes="pitch")
+    motion = bp.plan(snake, bp.Rectilinear(3, lift=0.0), bp.Plane(), bp.times(0, 1, dt=0.1))
+    assert not is_crawl(motion)
+    assert crawling_section(motion, {}) == "" and crawling_plots(motion) == {}
+
+
+def test_the_null_space_cannot_mend_a_lost_margin(benefits):
+    """With x, y and yaw commanded evenly the margin is negative whatever is done with z, roll and pitch."""
+    margins = [row.margin for row in benefits.values()]
+    assert max(margins) < -0.005 and np.ptp(margins) < 0.002
+    assert all(row.status == "ok" for row in benefits.values())
+
+
+def test_equation_22_crouches_and_the_barrier_keeps_height(benefits):
+    assert benefits["printed"].low < 0.5 * benefits["off"].low
+    assert benefits["text"].low < 0.5 * benefits["off"].low
+    assert benefits["barrier"].low > 0.95 * benefits["off"].low
+
+
+def test_levelling_is_real(benefits):
+    for choice in ("printed", "text", "barrier"):
+        assert benefits[choice].pitch < 0.7 * benefits["off"].pitch
