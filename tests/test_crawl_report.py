@@ -51,8 +51,9 @@ def test_the_null_space_cannot_mend_a_lost_margin(benefits):
 
 
 def test_equation_22_crouches_and_the_barrier_keeps_height(benefits):
-    assert benefits["printed"].low < 0.5 * benefits["off"].low
-    assert benefits["text"].low < 0.5 * benefits["off"].low
+    # in one cycle of 12 s by half, in two to the ground
+    assert benefits["printed"].low < 0.55 * benefits["off"].low
+    assert benefits["text"].low < 0.55 * benefits["off"].low
     assert benefits["barrier"].low > 0.95 * benefits["off"].low
 
 
