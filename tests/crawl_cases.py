@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 import bodyplan as bp
 from bodyplan.robot import Joint, Row
 
+#: hills and hollows of 80 mm
+ROUGH = "0.04*sin(6*x)*cos(5*y)"
 VARIABLES = ("theta", "d", "a", "epsilon")
 
 
@@ -38,6 +41,12 @@ def random_legs(rng: np.random.Generator, legs: int = 3) -> bp.Robot:
         ball = rng.uniform(-0.05, 0.05, 3).tolist()
         contacts.append(bp.Contact(f"{name}.foot", f"{name}.{count + 1}", "sphere", 0.01, start=ball))
     return bp.Robot.from_rows(rows, contacts=contacts)
+
+
+def five_legs(**options: Any) -> bp.Robot:
+    """Five legs around a round body."""
+    turns = np.arange(5) * 2 * np.pi / 5
+    return bp.walker({f"l{k}": (0.15 * np.cos(a), 0.15 * np.sin(a), a) for k, a in enumerate(turns)}, **options)
 
 
 def feet_by_hand(motion: Any) -> np.ndarray:
@@ -122,3 +131,36 @@ def _pose(base: np.ndarray) -> np.ndarray:
     )
     T[:, :3, 3] = base[:, :3]
     return T
+
+
+def rough_height(x: Any, y: Any) -> Any:
+    """Of ROUGH."""
+    return 0.04 * np.sin(6 * x) * np.cos(5 * y)
+
+
+def rough_normal(x: Any, y: Any) -> np.ndarray:
+    """Upward unit normal of ROUGH."""
+    slope = np.array([-0.24 * np.cos(6 * x) * np.cos(5 * y), 0.2 * np.sin(6 * x) * np.sin(5 * y), 1.0])
+    return slope / np.linalg.norm(slope)
+
+
+def normal_under(centre: np.ndarray, radius: float = 0.01) -> np.ndarray:
+    """Normal of ROUGH where a ball with its ``centre`` (3,) a radius off it touches it."""
+    point = centre
+    for _ in range(200):
+        point = centre - radius * rough_normal(point[0], point[1])
+    return rough_normal(point[0], point[1])
+
+
+def stances(motion: Any) -> Iterator[tuple[int, np.ndarray]]:
+    """(leg, rows) of every time in which a foot stands, of feet in the order of the contacts."""
+    for leg, on in enumerate((motion.contacts > 0.5).T[: len(motion.robot.chains)]):
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(int), [0]])))
+        for first, last in ends.reshape(-1, 2):
+            yield leg, np.arange(first, last)
+
+
+def yaw_of(base: np.ndarray) -> np.ndarray:
+    """Heading (T,) rad of poses (T, 7)."""
+    w, x, y, z = base[..., 3:].T
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
