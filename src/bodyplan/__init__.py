@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     )
     from bodyplan.export import load, save
     from bodyplan.fitting import Fit, exact_link_length, fit, links_on_curve
-    from bodyplan.gaits import Concertina, Rectilinear, Rolling, Serpentine, Sidewinding, SinusLifting
+    from bodyplan.gaits import Carry, Concertina, Crawl, Rectilinear, Rolling, Serpentine, Sidewinding, SinusLifting
     from bodyplan.ground import Corridor, HeightMap, Plane, Profile, Surface
     from bodyplan.job import run
     from bodyplan.missions import load_mission
@@ -99,7 +99,9 @@ _FACE = {
     "exact_link_length": "fitting",
     "fit": "fitting",
     "links_on_curve": "fitting",
+    "Carry": "gaits",
     "Concertina": "gaits",
+    "Crawl": "gaits",
     "Rectilinear": "gaits",
     "Rolling": "gaits",
     "Serpentine": "gaits",

@@ -34,6 +34,8 @@ class Status(StrEnum):
     CONFLICT = "conflict"  # what is commanded contradicts itself
     INFEASIBLE = "infeasible"  # what is commanded cannot be done within the limits
     DAMPED = "damped"  # near a singularity, where damping misses what is commanded
+    STANDS_STILL = "stands_still"  # a path that gives no direction to head for
+    JUMPS = "jumps"  # a contact leaves its place at once: the ground bends like what rolls on it
     DIVERGED = "diverged"  # the physics left the realm of finite numbers
 
 

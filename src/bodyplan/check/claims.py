@@ -10,6 +10,7 @@ import numpy as np
 from bodyplan import curves
 from bodyplan.arrays import Array
 from bodyplan.check.report import Line
+from bodyplan.check.rims import clears, rim_touches, rolls
 from bodyplan.check.support import polygon_margin
 from bodyplan.errors import UnknownNameError
 from bodyplan.motion import Claim, Motion
@@ -328,6 +329,9 @@ TESTS: dict[str, Callable[[Motion, Array, Claim], Line]] = {
     "grips": grips,
     "lifted": lifted,
     "supported": supported,
+    "rim_touches": rim_touches,
+    "rolls": rolls,
+    "clears": clears,
 }
 
 #: claims that a general test looks up

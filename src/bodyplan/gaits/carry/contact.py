@@ -1,0 +1,150 @@
+"""Where wheels touch the ground: the certified globally nearest contact of every wheel at every pose, in one batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.gaits.carry import newton, search
+from bodyplan.gaits.carry.planes import Planes, Section, Terrain, section
+
+#: outcomes
+TOUCHES, LIES_FLAT, NO_GROUND, AXLE_BELOW, UNPROVED, OFF_THE_MAP = range(6)
+#: relative difference up to which Newton's contact is the one that the search found
+SAME = 1e-10
+#: largest residual of a contact with a tangent, m
+RESIDUAL = 1e-11
+#: wheels looked at in one go
+CHUNK = 65_536
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Contacts of n wheels; where ``outcome`` (n,) is not TOUCHES the other values mean nothing.
+
+    ``phi`` (n,) rad contact angles, ``radius`` (n,) m, ``point`` (n, 3) m, ``normal`` (n, 3) of the ground,
+    ``curvature`` (n,) 1/m of its section by the wheel's plane, positive in a valley. ``residual`` (n,): the larger one
+    of eqs. (12) in m and (14), times the radius. ``second`` (n,) rad: contact angle of another contact as near, nan
+    where there is none. ``corner`` (n,): the wheel stands on an edge of the ground; then ``normal`` points to the
+    wheel's centre, (14) says nothing and ``curvature`` is minus infinity. ``hessian`` (n, 2, 2) 1/m of the ground at
+    the contact.
+    """
+
+    phi: Array
+    radius: Array
+    point: Array
+    normal: Array
+    curvature: Array
+    residual: Array
+    second: Array
+    corner: BoolArray
+    hessian: Array
+    outcome: IntArray
+
+    @property
+    def slack(self) -> Array:
+        """1 - kappa R (n,): 0 where the ground is as curved as the rim and the contact angle may jump."""
+        return np.asarray(1.0 - self.curvature * self.radius)
+
+
+def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contacts:
+    """The contacts of all wheels; ``start`` (n,) rad: contact angles to start from, for example those of a moment
+    before. They save steps and decide nothing: every contact is proved to be the nearest one."""
+    parts = [
+        _find(ground, planes.take(index), None if start is None else start[index])
+        for index in np.array_split(np.arange(len(planes)), max(1, -(-len(planes) // CHUNK)))
+    ]
+    return Contacts(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
+
+
+def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
+    foot = section(ground, planes, np.zeros(len(planes)))
+    outcome = np.full(len(planes), TOUCHES)
+    outcome[foot.w >= 0.0] = AXLE_BELOW
+    outcome[~foot.found] = NO_GROUND
+    outcome[planes.flat] = LIES_FLAT
+    chi, radius = _guess(foot, planes, start)
+    second, corner = np.full(len(planes), np.nan), np.zeros(len(planes), dtype=np.bool_)
+    good = np.flatnonzero(outcome == TOUCHES)
+    some = planes if len(good) == len(planes) else planes.take(good)
+    chi[good], radius[good], settled = newton.solve(ground, some, chi[good], radius[good])
+    settled &= radius[good] <= np.abs(foot.w[good]) * (1.0 + SAME)
+    sure = settled & search.certain(ground, some, _part(foot, good), radius[good])
+    unsure = good[~sure]
+    if len(unsure):
+        _search(ground, planes, unsure, settled[~sure], chi, radius, second, corner, outcome)
+    return _measured(ground, planes, chi, radius, second, corner, outcome)
+
+
+def _guess(foot: Section, planes: Planes, start: Array | None) -> tuple[Array, Array]:
+    """Where the tangent of the section below the centre is nearest; or where the ground is in a given direction."""
+    with np.errstate(all="ignore"):
+        chi = np.arctan(foot.first) if start is None else start + planes.lean
+        # distance of that tangent in the direction chi
+        radius = -foot.w / (np.cos(chi) + foot.first * np.sin(chi))
+        wrong = ~(np.isfinite(radius) & (radius > 0.0) & (radius < -10.0 * foot.w))
+        chi = np.where(wrong, np.arctan(foot.first), chi)
+        radius = np.where(wrong, np.abs(foot.w) * np.cos(np.arctan(foot.first)), radius)
+    return chi, radius
+
+
+def _search(
+    ground: Terrain,
+    planes: Planes,
+    unsure: IntArray,
+    settled: BoolArray,
+    chi: Array,
+    radius: Array,
+    second: Array,
+    corner: BoolArray,
+    outcome: IntArray,
+) -> None:
+    """Contacts that one look does not prove, into the arrays of all."""
+    some = planes.take(unsure)
+    guess = np.where(settled, radius[unsure] * np.sin(chi[unsure]), 0.0)
+    found = search.nearest(ground, some, guess)
+    at = section(ground, some, found.s)
+    angle = np.arctan2(found.s, -at.w)
+    fine_chi, fine_radius, fine = newton.solve(ground, some, angle, found.distance)
+    # Newton improves a contact with a tangent; on an edge it goes elsewhere
+    fine &= np.abs(fine_radius - found.distance) <= SAME * found.distance
+    fine &= np.abs(fine_radius * np.sin(fine_chi) - found.s) <= search.APART * found.distance
+    chi[unsure], radius[unsure] = np.where(fine, fine_chi, angle), np.where(fine, fine_radius, found.distance)
+    # only ground with edges has contacts without a tangent
+    edged = bool(ground.field_creases())
+    corner[unsure] = ~fine & edged
+    other = section(ground, some, np.where(np.isnan(found.second), 0.0, found.second))
+    second[unsure] = np.where(np.isnan(found.second), np.nan, np.arctan2(found.second, -other.w) - some.lean)
+    outcome[unsure[~(found.certified & (fine | edged))]] = UNPROVED
+
+
+def _measured(
+    ground: Terrain, planes: Planes, chi: Array, radius: Array, second: Array, corner: BoolArray, outcome: IntArray
+) -> Contacts:
+    """Everything about the contacts at ``chi``, ``radius``."""
+    sine, cosine = np.sin(chi)[:, None], np.cos(chi)[:, None]
+    u, t = sine * planes.ahead - cosine * planes.up, cosine * planes.ahead + sine * planes.up
+    point = planes.centre + radius[:, None] * u
+    with np.errstate(all="ignore"):
+        f, g, hessian = ground.field_jet(point[:, 0], point[:, 1])
+        upward = np.concatenate([-g, np.ones((len(g), 1))], axis=1)
+        along = np.sum(upward * u, axis=1)
+        curvature = -np.einsum("ni,nij,nj->n", t[:, :2], hessian, t[:, :2]) / along
+        height = np.abs(point[:, 2] - f)
+        residual = np.maximum(height, radius * np.abs(np.sum(upward * t, axis=1)))
+        normal = upward / np.linalg.norm(upward, axis=1, keepdims=True)
+    normal = np.where(corner[:, None], -u, normal)
+    curvature = np.where(corner, -np.inf, curvature)
+    residual = np.where(corner, height, residual)
+    low, high = ground.field_box
+    inside = np.all((point[:, :2] >= low) & (point[:, :2] <= high), axis=1)
+    outcome = np.where((outcome == TOUCHES) & ~inside, OFF_THE_MAP, outcome)
+    wrong = ~(residual <= RESIDUAL * (1.0 + np.abs(planes.centre).max(axis=1, initial=0.0)))
+    outcome = np.where((outcome == TOUCHES) & wrong, UNPROVED, outcome)
+    return Contacts(chi - planes.lean, radius, point, normal, curvature, residual, second, corner, hessian, outcome)
+
+
+def _part(at: Section, index: IntArray) -> Section:
+    return Section(*(getattr(at, f.name)[index] for f in fields(Section)))

@@ -1,0 +1,70 @@
+"""Whether the hull of a body touches the ground: boxes fixed to the base against bounds of the height."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray
+from bodyplan.gaits.carry.planes import Terrain
+from bodyplan.robot.elements import Contact
+from bodyplan.robot.model import Robot
+
+#: m: a part of a face this small is judged by its middle
+SMALL = 1e-4
+#: points along each side of a face at which clearances are measured
+SIDE = 13
+_LEVELS = 40
+_CHUNK = 16_384
+
+
+def boxes(robot: Robot) -> tuple[Contact, ...]:
+    """The hull: contacts of shape "box" on the base."""
+    return tuple(contact for contact in robot.contacts if contact.shape == "box" and contact.frame == "base")
+
+
+def touches(robot: Robot, ground: Terrain, position: Array, rotation: Array) -> BoolArray:
+    """(n,) True where a box of the hull reaches the ground, for bases at ``position`` (n, 3) m with orientations
+    ``rotation`` (n, 3, 3). Parts of a face that bounds of the ground's height clear are dropped, the others cut into
+    four; ground that rises less than 0.1 mm into a face may pass."""
+    out = np.zeros(len(position), dtype=np.bool_)
+    for box in boxes(robot):
+        for first in range(0, len(position), _CHUNK):
+            part = slice(first, first + _CHUNK)
+            for axis in range(3):
+                for side in (-1.0, 1.0):
+                    out[part] |= _face(box, axis, side, ground, position[part], rotation[part])
+    return out
+
+
+def lower_face(box: Contact) -> Array:
+    """Points (p, 3) m of the lower face of a box, in the base."""
+    x, y = (v.ravel() for v in np.meshgrid(*(np.linspace(-1.0, 1.0, SIDE) for _ in range(2))))
+    return np.asarray(np.array(box.start) + np.stack([x, y, -np.ones_like(x)], axis=1) * np.array(box.half))
+
+
+def _face(box: Contact, axis: int, side: float, ground: Terrain, position: Array, rotation: Array) -> BoolArray:
+    """Of one face; those that look up or aside reach the ground only with one that looks down."""
+    owner = np.flatnonzero(side * rotation[:, 2, axis] < -1e-9)
+    out = np.zeros(len(position), dtype=np.bool_)
+    others = [i for i in range(3) if i != axis]
+    half = np.array(box.half)
+    offset = np.array(box.start)
+    offset[axis] += side * half[axis]
+    centre = position[owner] + rotation[owner] @ offset
+    spread = rotation[owner][:, :, others] * half[others]  # (k, 3, 2): half edges
+    with np.errstate(all="ignore"):
+        for _ in range(_LEVELS):
+            if not len(owner):
+                break
+            size = np.abs(spread).sum(axis=2)
+            highest = ground.field_bounds((centre - size)[:, :2], (centre + size)[:, :2]).z[1]
+            near = ~(highest < centre[:, 2] - size[:, 2]) & ~out[owner]
+            owner, centre, spread, size = owner[near], centre[near], spread[near], size[near]
+            inside = ground.field_jet(centre[:, 0], centre[:, 1])[0] >= centre[:, 2]
+            out[owner[inside]] = True
+            keep = ~out[owner] & (size.max(axis=1, initial=0.0) > SMALL)
+            owner, centre, spread = owner[keep], centre[keep], 0.5 * spread[keep]
+            signs = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
+            centre = (centre[:, None] + np.einsum("kij,sj->ksi", spread, signs)).reshape(-1, 3)
+            owner, spread = np.repeat(owner, 4), np.repeat(spread, 4, axis=0)
+    return out

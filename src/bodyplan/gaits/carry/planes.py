@@ -1,0 +1,170 @@
+"""The upright section of the ground by the plane of a wheel.
+
+In the plane of a wheel let s count along its horizontal direction ``ahead`` and w along its steepest one, ``up``; both
+are 0 at the wheel's centre c. The ground z = f(x, y) cuts it in the curve w = W(s) with
+
+    h(s, w) = c_z + w up_z - f(c + s ahead + w up) = 0,
+    W'  = (grad f . ahead) / n,      n = up_z - grad f . up,
+    W'' = (a' Hess f a) / n,         a = ahead + W' up,
+
+(x and y parts only). The plane of a wheel that does not lean is upright: then up = (0, 0, 1) and W is f along a line.
+A point at a distance R from the centre in the direction chi from straight down is s = R sin(chi), w = -R cos(chi).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.errors import InputError
+from bodyplan.ground.base import Ground
+from bodyplan.ground.descent import JetFunction
+from bodyplan.ground.field import Field
+from bodyplan.ground.nearest import Bounds
+from bodyplan.ground.plane import Plane
+
+#: a plane whose ``up`` leans less counts as upright
+UPRIGHT = 1e-15
+_STEPS = 40
+
+
+class Terrain(Protocol):
+    """What contacts ask of a ground; see :class:`bodyplan.ground.field.Field`."""
+
+    def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """Height (n,), gradient (n, 2) and Hessian (n, 2, 2)."""
+
+    def field_bounds(self, low: Array, high: Array) -> Bounds:
+        """Bounds over boxes with corners (n, 2)."""
+
+    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
+        """Rate (n, 2, 2) of the Hessian for points that move by dx, dy (n,)."""
+
+    def field_creases(self) -> Sequence[JetFunction]:
+        """Functions whose zeros are the lines where the ground has no derivative."""
+
+    @property
+    def field_box(self) -> Array:
+        """Corners (2, 2) of the rectangle on which the ground is given."""
+
+
+class _Slope:
+    """A plane as terrain."""
+
+    def __init__(self, plane: Plane) -> None:
+        self.level, self.slope = plane.level, np.array(plane.slope)
+
+    @property
+    def field_box(self) -> Array:
+        return np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
+
+    def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        g = np.empty((len(x), 2))
+        g[:] = self.slope
+        return self.level + self.slope[0] * x + self.slope[1] * y, g, np.zeros((len(x), 2, 2))
+
+    def field_bounds(self, low: Array, high: Array) -> Bounds:
+        ends = np.sort([low * self.slope, high * self.slope], axis=0).sum(axis=-1) + self.level
+        return Bounds(ends, np.zeros((2, len(low), 2, 2)), np.zeros(len(low)))
+
+    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
+        return np.zeros((len(x), 2, 2))
+
+    def field_creases(self) -> Sequence[JetFunction]:
+        return ()
+
+
+def terrain(ground: Ground) -> Terrain:
+    """A ground that wheels can roll on. InputError for one that is no graph with second derivatives."""
+    if isinstance(ground, Plane):
+        return _Slope(ground)
+    if isinstance(ground, Field):
+        return ground
+    raise InputError(
+        f"ground: wheels roll on plane, surface and height_map; {ground.kind!r} has edges without a normal "
+        "(a smooth step is for example Surface('0.02*tanh(20*x)'))."
+    )
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Planes of n wheels: ``centre`` (n, 3) m, unit vectors ``ahead`` (n, 3) (horizontal) and ``up`` (n, 3), and
+    ``lean`` (n,) rad: the contact angle phi is chi - lean. ``flat`` (n,) True where the wheel lies on its side."""
+
+    centre: Array
+    ahead: Array
+    up: Array
+    lean: Array
+    flat: BoolArray
+
+    @staticmethod
+    def of(centre: Array, ahead: Array, axle: Array) -> Planes:
+        """Planes through ``centre`` (n, 3) across ``axle`` (n, 3); phi counts from the wheel's own down, at right
+        angles to ``ahead`` (n, 3)."""
+        up = -axle[:, 2:] * axle
+        up[:, 2] += 1.0
+        size = np.linalg.norm(up, axis=1)
+        flat = size < 1e-9
+        up = np.where(flat[:, None], [0.0, 0.0, 1.0], up) / np.where(flat, 1.0, size)[:, None]
+        # upright to rounding: exactly upright, so that a section is a line on the map
+        up[np.abs(up[:, :2]).max(axis=1, initial=0.0) < UPRIGHT] = (0.0, 0.0, 1.0)
+        level = np.cross(axle, up)
+        level[:, 2] = 0.0
+        lean = np.arctan2(np.sum(ahead * up, axis=1), np.sum(ahead * level, axis=1))
+        return Planes(centre, level, up, lean, flat)
+
+    def __len__(self) -> int:
+        return len(self.centre)
+
+    @property
+    def upright(self) -> BoolArray:
+        """(n,) True where the plane is upright."""
+        return np.asarray(~np.any(self.up[:, :2], axis=1))
+
+    def take(self, index: IntArray) -> Planes:
+        """Some of the planes, (k,)."""
+        return Planes(self.centre[index], self.ahead[index], self.up[index], self.lean[index], self.flat[index])
+
+    def points(self, s: Array, w: Array) -> Array:
+        """Points (n, 3) m of the planes at s, w (n,)."""
+        return self.centre + s[:, None] * self.ahead + w[:, None] * self.up
+
+
+@dataclass(frozen=True)
+class Section:
+    """The ground curve of n planes at one s each: W, W', W'' (n,), the ground's Hessian (n, 2, 2) and gradient (n, 2)
+    there, n of the module's text (n,), and whether the curve was found."""
+
+    w: Array
+    first: Array
+    second: Array
+    gradient: Array
+    hessian: Array
+    steep: Array
+    found: BoolArray
+
+
+def section(ground: Terrain, planes: Planes, s: Array, guess: Array | None = None) -> Section:
+    """The ground curve at ``s`` (n,) m, by Newton in w from ``guess`` (n,); exact at once where the plane is
+    upright."""
+    w = np.zeros(len(s)) if guess is None else np.array(guess)
+    scale = 1e-15 * (1.0 + np.abs(planes.centre).max(axis=1, initial=0.0))
+    with np.errstate(all="ignore"):
+        for _ in range(_STEPS):
+            at = planes.points(s, w)
+            f, g, hessian = ground.field_jet(at[:, 0], at[:, 1])
+            n = planes.up[:, 2] - np.sum(g * planes.up[:, :2], axis=1)
+            step = (f - at[:, 2]) / n
+            w = w + step
+            if not np.any(np.abs(step) > scale) or planes.upright.all():
+                break
+        first = np.sum(g * planes.ahead[:, :2], axis=1) / n
+        along = planes.ahead[:, :2] + first[:, None] * planes.up[:, :2]
+        second = np.einsum("ni,nij,nj->n", along, hessian, along) / n
+        found = np.isfinite(w) & (n > 0.0) & (np.abs(step) <= 1e3 * scale + 1e-9 * np.abs(w))
+        found |= np.isfinite(w) & planes.upright
+    return Section(w, first, second, g, hessian, n, found)
