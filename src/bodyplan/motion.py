@@ -47,10 +47,10 @@ class Claim:
       inside their hull seen from above; from ``start`` to ``end`` s where they are given.
     * ``lifted``: between ``start`` and ``end`` (s), and again every ``every`` s (None: once), each of ``frames`` rises
       to ``height`` m above the higher of its places at both; ``stage`` names the phase; ``tolerance`` m.
-    * ``rim_touches``: every rim of ``contacts`` (names) touches the ground, to ``tolerance`` m, and is nowhere below it, at
-      the ``samples`` given (indices; all where there are none).
-    * ``rolls``: where the rims of ``contacts`` touch they slip along their way at most the share ``tolerance`` of the speed
-      of their hubs (root mean square).
+    * ``rim_touches``: every rim of ``contacts`` (names) touches the ground, to ``tolerance`` m, and is nowhere below
+      it, at the ``samples`` given (indices; all where there are none).
+    * ``rolls``: where the rims of ``contacts`` touch they slip along their way at most the share ``tolerance`` of the
+      speed of their hubs (root mean square).
     * ``clears``: the boxes of ``contacts`` keep ``required`` m from the ground, at the ``samples`` given.
     * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).
     """

@@ -68,9 +68,11 @@ def facts(
         out["smallest_adjust_angle"] = min(float(q.min()) for q in angles.values())
         out["largest_adjust_angle"] = max(float(q.max()) for q in angles.values())
         out["peak_adjust_rate"] = max(float(np.abs(rolled.qd[ok, wheel.adjust]).max()) for _, wheel in adjusted)
-        estimates = [_paper_torque(robot.mass, wheel.law, angles[wheel.name], len(wheels)) for _, wheel in adjusted]
-        out["smallest_paper_torque"] = min(float(e.min()) for e in estimates)
-        out["largest_paper_torque"] = max(float(e.max()) for e in estimates)
+        estimates = {wheel.name: _paper_torque(robot.mass, wheel.law, angles[wheel.name], len(wheels))
+                     for _, wheel in adjusted}  # fmt: skip
+        out |= {f"{name}_paper_torque": float(torque.max()) for name, torque in estimates.items()}
+        out["smallest_paper_torque"] = min(float(torque.min()) for torque in estimates.values())
+        out["largest_paper_torque"] = max(float(torque.max()) for torque in estimates.values())
         radii = [rolled.wheels[k].radius[ok] for k, _ in adjusted]
         out["smallest_radius"], out["largest_radius"] = min(r.min() for r in radii), max(r.max() for r in radii)
         out["reach_margin"] = min(
