@@ -336,6 +336,7 @@ def test_every_number_of_a_run_has_the_unit_that_its_name_says():
         "advance_ratio_cycle_1",
         "forward_ratio",
         "lift_ratio",
+        "yaw_ratio",
         "cost_of_transport",
     }
 

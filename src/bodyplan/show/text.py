@@ -11,7 +11,7 @@ from typing import Any
 
 NOTHING = "–"
 #: deg: an angle below this is rounding
-NO_ANGLE = 1e-6
+NO_ANGLE = 1e-9
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 #: last word of a quantity's name -> its SI unit, for numbers that come without one

@@ -22,8 +22,9 @@ from bodyplan.robot.model import Robot
 STABILITIES = ("margin", "barrier", "most")
 FOOTHOLDS = ("nearest", "search")
 BODIES = ("level", "follow")
-#: s of a step, sway and swing, where the user names no cycle time; longest stride as a share of a leg
-STEP_TIME, STRIDE = 3.0, 0.35
+#: s of a step, sway and swing, where the user names no cycle time; longest stride as a share of a leg, and of the
+#: distance of two feet, which should not get into each other's way
+STEP_TIME, STRIDE, APART = 3.0, 0.35, 0.7
 #: share of the time in which some leg swings, if joints are fast enough: they have ROOM below their limits on level
 #: ground; and what the share may be where they are not
 SWINGING, ROOM, BOUNDS = 0.6, 0.85, (0.4, 0.85)
@@ -38,10 +39,11 @@ class Crawl(Gait):
 
     ``velocity`` (ahead, to the left) m/s in the body's heading and ``yaw_rate`` rad/s: of the steady motion (a third
     number, up, must be 0: the ground says it). ``cycle_time`` s in which every leg swings once (default: 3 s a leg, or
-    less where the stride would be longer than 0.35 of a leg). ``duty``: share of the cycle that a foot stands, above
-    1 - 1/m for m legs (default 1 - 0.6/m: the body moves in 40 % of the time; between 1 - 0.4/m and 1 - 0.85/m where
-    joints would else be too fast on level ground). ``sequence``: names of the legs in the order in which they swing
-    (default: from the rear to the front on the left, then on the right, as seen in the direction of travel).
+    less where the stride would be longer than 0.35 of a leg or 0.7 of the distance of two feet). ``duty``: share of
+    the cycle that a foot stands, above 1 - 1/m for m legs (default 1 - 0.6/m: the body moves in 40 % of the time;
+    between 1 - 0.4/m and 1 - 0.85/m where joints would else be too fast on level ground). ``sequence``: names of the
+    legs in the order in which they swing (default: from the rear to the front on the left, then on the right, as seen
+    in the direction of travel).
 
     ``sway``: "auto", or the share (0: none) of the way from where the body would be to the centroid of the feet that
     stand. ``stability``: how much sway "auto" takes: "margin", the least that keeps the centre of mass ``margin`` m
@@ -179,7 +181,7 @@ class Crawl(Gait):
             )
         offsets[:, :2] *= ((out + reach) / out)[:, None]
         offsets[:, 2] = 0.0
-        cycle = self._cycle(size, float(np.linalg.norm(offsets[:, :2], axis=1).max()), len(legs))
+        cycle = self._cycle(size, offsets[:, :2])
         swing = (1.0 - duty) * cycle
         sway = cycle / len(legs) - swing
         if sway <= 1e-9 * cycle:
@@ -232,12 +234,16 @@ class Crawl(Gait):
             raise InputError(f"Crawl: the legs of {legs.robot.name!r} have no length; name height and reach.")
         return float(np.hypot(self.height, self.reach))
 
-    def _cycle(self, size: float, radius: float, count: int) -> float:
+    def _cycle(self, size: float, feet: Array) -> float:
+        """s a cycle, of legs ``size`` m long with feet (m, 2) m around the middle of the body."""
         if self.cycle_time is not None:
             return self.cycle_time
-        speed = float(np.hypot(*self.velocity)) + abs(self.yaw_rate) * radius
+        count = len(feet)
+        apart = np.linalg.norm(feet[:, None] - feet + 1e9 * np.eye(count)[..., None], axis=-1).min()
+        stride = min(STRIDE * size, APART * float(apart))
+        speed = float(np.hypot(*self.velocity)) + abs(self.yaw_rate) * float(np.linalg.norm(feet, axis=1).max())
         longest = count * STEP_TIME
-        return longest if speed * longest <= STRIDE * size else STRIDE * size / speed
+        return longest if speed * longest <= stride else stride / speed
 
     def period(self, robot: Robot, ground: Ground | None = None) -> float | None:
         """Time in which every leg swings once, s, on a level floor; None on other ground."""
