@@ -199,6 +199,18 @@ def test_lifting_before_advancing_overreaches_from_a_straight_leg_and_the_cycloi
     assert waits.legs.short.min() < -1e-2 and np.isnan(waits.angles).any()
 
 
+@pytest.mark.parametrize("off", [-3e-14, -1e-15, 1e-15, 3e-14])
+def test_a_leg_that_is_straight_but_for_rounding_begins_as_a_straight_one(off: float) -> None:
+    """Anchors come from sums: a leg that is 1e-15 too short or too long for its links is meant to be straight."""
+    links, tau = np.full(4, 2.0), np.array([1e-4, 1e-3, 1e-2, 0.3, 0.7])
+    exact, rounded = (
+        at(one_move([[x, 0], [4, 0], [6, 0]], [[x + 2.4, 0], [4, 0], [6, 0]], [0.2, 0, 0]), links, tau)
+        for x in (0.0, off)
+    )
+    for name in ("angles", "first", "second"):
+        np.testing.assert_allclose(getattr(rounded, name), getattr(exact, name), rtol=1e-9, atol=1e-15)
+
+
 def test_the_lifted_middle_move_peaks_between_its_ends() -> None:
     """Fig. 8's middle move with 150 mm of lift: 1998.2 mm, its ends 1985.5."""
     links = np.full(4, 2000.0)

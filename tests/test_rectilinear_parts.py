@@ -18,6 +18,7 @@ ROBOTS: dict[str, Any] = {
     "thin": lambda: snake(radius=0.01),
     "thick": lambda: bp.snake(10, 0.1, axes="alternating", first="pitch"),
     "feet": lambda: bp.snake(10, 0.1, **(THIN | {"foot_radius": 0.03, "foot_spread": 0.06})),
+    "feet close by": lambda: bp.snake(10, 0.1, **(THIN | {"foot_radius": 0.03, "foot_spread": 0.028})),
     "feet in line": lambda: bp.snake(10, 0.1, **(THIN | {"foot_radius": 0.03})),
     "pitch only": lambda: bp.snake(6, 0.2, axes="pitch", radius=0.02),
     "unequal": lambda: bp.snake(6, [0.1, 0.3, 0.1, 0.1, 0.3, 0.1], axes="pitch", radius=0.01),
@@ -57,6 +58,17 @@ def test_overlaps_are_those_of_the_judge(name: str) -> None:
         if "feet" not in name and -parts.need.max() < into < 0.999 * parts.need.max():
             assert into == pytest.approx(-gap, abs=1.1e-3 * parts.need.max())
     assert min(found.values()) >= 5, found
+
+
+def test_parts_beside_each_other_need_less_in_the_plane() -> None:
+    """Feet of 30 mm at 28 mm to either side and links of 5 mm: balls on one side need 60 mm, on both sides what is left
+    of that over 56 mm across, a ball and a link what is left of 35 mm over 28 mm, two links 10 mm."""
+    parts = InchingSnake.of(ROBOTS["feet close by"](), 3, None).parts
+    assert parts is not None
+    needs = 1.001 * np.array([0.01, 0.035, 0.06])
+    across = [0.0, 0.028, 0.056]
+    wanted = [0.0, needs[2], *np.sqrt(needs**2 - np.square(across))]
+    np.testing.assert_allclose(np.unique(np.round(parts.need, 12)), np.unique(np.round(wanted, 12)), atol=1e-12)
 
 
 @pytest.mark.parametrize("schedule", ["wave", "two-phase"])

@@ -91,7 +91,7 @@ def breaks(demands: Demands, long: Any, stride: float, schedule: str, lift: floa
         assert np.isfinite(joints).all()
         heights = anchors[:, :-1, 1] + a * np.sin(np.cumsum(joints, axis=1)[:, 0:-1:2])
         low = np.minimum(anchors[:, :-1, 1], anchors[:, 1:, 1])
-        if (heights - low).max() > demands.ceiling + slack:
+        if max((heights - low).max(), anchors[..., 1].max()) > demands.ceiling + slack:
             return "ceiling"
         if len(demands.limits):
             beyond = np.maximum(demands.limits[:, 0] - joints, joints - demands.limits[:, 1])
@@ -138,6 +138,7 @@ CASES = [
     (5, 1.0, 0.4, None, 0.0, 1.0), (5, "unequal", 0.95, 1.0, 0.0, 1.0), (5, 1.0, np.inf, 0.9, 0.15, 1.0),
     (7, "unequal", 0.6, None, 0.05, 1.0), (7, 1.0, 0.95, 1.2, 0.05, 0.9), (5, "unequal", np.inf, None, 0.05, 1.0),
     (3, 1.0, 0.95, 1.5, 0.4, 1.0), (5, "unequal", 0.6, 1.3, 0.15, 0.7), (3, 1.0, np.inf, 0.8, 0.3, 0.98),
+    (3, 1.0, 0.6, None, 0.6, 0.995), (3, 1.0, 0.9, 0.88, 0.8, 1.0),
 ]  # fmt: skip
 
 
