@@ -84,8 +84,9 @@ def rolls(motion: Motion, positions: Array, claim: Claim) -> Line:
         rotation = matrix_from_quaternion(pose[:, 3:])
         turn = np.einsum("tij,tkj->tik", rotation[2:], rotation[:-2])
         spin = rotation_log(turn) / span
-        coarse = max(coarse, float(np.linalg.norm(spin * 0.5 * span, axis=1).max()))
         velocity = (pose[2:, :3] - pose[:-2, :3]) / span
+        # how far a hub that rolls would turn from sample to sample: beyond half a turn in two nobody can tell
+        coarse = max(coarse, float((np.linalg.norm(velocity, axis=1) * 0.5 * span[:, 0] / radii[1:-1, k]).max()))
         arm = _lowest(motion, k, contact, inner, *ROLLING)[1] - pose[1:-1, :3]
         growth = (radii[2:, k] - radii[:-2, k])[:, None] / span
         material = velocity + np.cross(spin, arm) + growth * arm / radii[1:-1, k, None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,8 @@ from bodyplan.ground.nearest import Bounds, nearest
 #: samples along each side of a field for physics and pictures
 MAX_SIDE = 1024
 _CHUNK = 32_768
+#: regions whose bounds are remembered
+_REGIONS = 4096
 
 
 class Field(Ground):
@@ -43,6 +46,26 @@ class Field(Ground):
     @abstractmethod
     def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
         """Rate (n, 2, 2) of the Hessian at x, y (n,) for a point that moves by dx, dy (n,) a unit of time."""
+
+    def region_bounds(self, low: Array, high: Array) -> tuple[float, float]:
+        """(highest ground m, largest norm of its Hessian 1/m) over a box with corners (2,): loose bounds, over a larger
+        box on a grid as wide as this one, remembered for the next boxes nearby. Infinite where nothing is known."""
+        side = 2.0 ** np.ceil(np.log2(max(float((high - low).max()), 1e-9)))
+        a, b = np.floor(low / side) * side, np.ceil(high / side) * side
+        key = (*a.tolist(), *b.tolist())
+        known = self._regions.get(key)
+        if known is None:
+            bounds = self.field_bounds(a[None], b[None])
+            size = np.abs(bounds.hessian[:, 0]).max(axis=0)
+            known = float(bounds.z[1, 0]), float(max(size[0, 0], size[1, 1]) + size[0, 1])
+            if len(self._regions) >= _REGIONS:
+                self._regions.clear()
+            self._regions[key] = known
+        return known
+
+    @cached_property
+    def _regions(self) -> dict[tuple[float, ...], tuple[float, float]]:
+        return {}
 
     def field_creases(self) -> Sequence[JetFunction]:
         """Functions whose zeros are the lines where the ground has no derivative."""

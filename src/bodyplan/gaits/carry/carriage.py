@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
+from bodyplan.errors import InputError
+from bodyplan.gaits.carry.laws import Law
 from bodyplan.gaits.carry.orientation import Function, Turning, turning
 from bodyplan.gaits.carry.paths import Course
 from bodyplan.gaits.carry.planes import Terrain
@@ -59,10 +61,21 @@ def direction(gait: Carry, course: Course, t: Array) -> Function:
     return course.direction if gait.heading is None else gait.heading.at(t)
 
 
+def _tilt(law: Law, name: str, t: Array) -> Function:
+    """Roll or pitch; InputError where it is a right angle or more, at which a heading says nothing."""
+    tilt = law.at(t)
+    beyond = np.flatnonzero(np.abs(tilt.value) >= 0.5 * np.pi)
+    if len(beyond):
+        k = int(beyond[0])
+        raise InputError(f"{name}: must stay within +-pi/2 rad, is {tilt.value[k]:.4g} at t = {t[k]:.4g} s.")
+    return tilt
+
+
 def carriage(gait: Carry, ground: Terrain, ahead: float, height: Callable[[Array], Function], t: Array) -> Carriage:
     """The base at times t (T,); ``ahead`` m is where on the body's x axis the point is that follows the path."""
     course = gait.course(t)
-    turn = turning(direction(gait, course, t), gait.roll.at(t), gait.pitch.at(t))
+    roll, pitch = _tilt(gait.roll, "roll", t), _tilt(gait.pitch, "pitch", t)
+    turn = turning(direction(gait, course, t), roll, pitch)
     offset = ahead * turn.matrix[:, :, 0]
     swing = np.cross(turn.spin, offset)
     place = course.place - offset[:, :2]

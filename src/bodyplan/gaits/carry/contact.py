@@ -9,6 +9,7 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry import newton, search
 from bodyplan.gaits.carry.planes import Planes, Section, Terrain, section
+from bodyplan.threads import shared
 
 #: outcomes
 TOUCHES, LIES_FLAT, NO_GROUND, AXLE_BELOW, UNPROVED, OFF_THE_MAP = range(6)
@@ -17,7 +18,7 @@ SAME = 1e-10
 #: largest residual of a contact with a tangent, m
 RESIDUAL = 1e-11
 #: wheels looked at in one go
-CHUNK = 65_536
+CHUNK = 8192
 
 
 @dataclass(frozen=True)
@@ -52,11 +53,17 @@ class Contacts:
 def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contacts:
     """The contacts of all wheels; ``start`` (n,) rad: contact angles to start from, for example those of a moment
     before. They save steps and decide nothing: every contact is proved to be the nearest one."""
-    parts = [
-        _find(ground, planes.take(index), None if start is None else start[index])
-        for index in np.array_split(np.arange(len(planes)), max(1, -(-len(planes) // CHUNK)))
-    ]
-    return Contacts(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
+    parts: dict[int, Contacts] = {}
+
+    def part(first: int, last: int) -> int:
+        for k in range(first, max(last, first + 1), CHUNK):
+            index = np.arange(k, min(k + CHUNK, last))
+            parts[k] = _find(ground, planes.take(index), None if start is None else start[index])
+        return 0
+
+    shared(part, len(planes), threaded_from=2 * CHUNK)
+    found = [parts[k] for k in sorted(parts)]
+    return Contacts(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Contacts)))
 
 
 def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:

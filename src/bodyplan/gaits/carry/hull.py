@@ -28,12 +28,24 @@ def touches(robot: Robot, ground: Terrain, position: Array, rotation: Array) -> 
     four; ground that rises less than 0.1 mm into a face may pass."""
     out = np.zeros(len(position), dtype=np.bool_)
     for box in boxes(robot):
-        for first in range(0, len(position), _CHUNK):
-            part = slice(first, first + _CHUNK)
-            for axis in range(3):
-                for side in (-1.0, 1.0):
-                    out[part] |= _face(box, axis, side, ground, position[part], rotation[part])
+        for part in np.array_split(np.arange(len(position)), max(1, -(-len(position) // _CHUNK))):
+            near = part[_near(box, ground, position[part], rotation[part])]
+            if len(near):
+                for axis in range(3):
+                    for side in (-1.0, 1.0):
+                        out[near] |= _face(box, axis, side, ground, position[near], rotation[near])
     return out
+
+
+def _near(box: Contact, ground: Terrain, position: Array, rotation: Array) -> BoolArray:
+    """(n,) False where the box is above all ground that there is in the region."""
+    if not len(position):
+        return np.zeros(0, dtype=np.bool_)
+    centre = position + rotation @ np.array(box.start)
+    size = np.abs(rotation) @ np.array(box.half)
+    low, high = (centre - size).min(axis=0), (centre + size).max(axis=0)
+    highest, _ = ground.region_bounds(low[:2], high[:2])
+    return np.asarray(~(centre[:, 2] - size[:, 2] > highest))
 
 
 def lower_face(box: Contact) -> Array:

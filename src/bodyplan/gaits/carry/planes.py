@@ -44,6 +44,9 @@ class Terrain(Protocol):
     def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
         """Rate (n, 2, 2) of the Hessian for points that move by dx, dy (n,)."""
 
+    def region_bounds(self, low: Array, high: Array) -> tuple[float, float]:
+        """(highest ground, largest norm of its Hessian) over a box with corners (2,), loosely."""
+
     def field_creases(self) -> Sequence[JetFunction]:
         """Functions whose zeros are the lines where the ground has no derivative."""
 
@@ -73,6 +76,9 @@ class _Slope:
 
     def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
         return np.zeros((len(x), 2, 2))
+
+    def region_bounds(self, low: Array, high: Array) -> tuple[float, float]:
+        return float(self.field_bounds(low[None], high[None]).z[1, 0]), 0.0
 
     def field_creases(self) -> Sequence[JetFunction]:
         return ()

@@ -14,12 +14,12 @@ sideways slip. Where a wheel stands on an edge of the ground, p is where the edg
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
-from bodyplan.gaits.carry.contact import Contacts
+from bodyplan.gaits.carry.contact import TOUCHES, Contacts
 from bodyplan.gaits.carry.planes import Terrain
 
 #: slack 1 - kappa R below which the contact angle has no rate: the contact jumps
@@ -61,6 +61,8 @@ class Rates:
 def rates(ground: Terrain, found: Contacts, carried: Carried) -> Rates:
     """Rates of contacts that were found at the places of ``carried``."""
     c = carried
+    # what does not touch has no rates
+    found = replace(found, radius=np.where(found.outcome == TOUCHES, found.radius, np.nan))
     R = found.radius
     sine, cosine = np.sin(found.phi)[:, None], np.cos(found.phi)[:, None]
     u, t = sine * c.ahead + cosine * c.down, cosine * c.ahead - sine * c.down

@@ -17,7 +17,7 @@ the best one is a second contact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -51,12 +51,21 @@ class Found:
 
 
 def certain(ground: Terrain, planes: Planes, foot: Section, distance: Array) -> BoolArray:
-    """(n,) True where one look at the bounds proves that no other ground is as near as ``distance`` (n,) m; ``foot`` is
+    """(n,) True where a look at the bounds proves that no other ground is as near as ``distance`` (n,) m; ``foot`` is
     the section at s = 0."""
     reach = distance * (1.0 + TWICE)
-    known = _known(ground, planes, foot, np.zeros_like(reach), reach)
-    bend = np.maximum(np.abs(known.low), np.abs(known.high))
-    return np.asarray(known.valid & (bend * reach < _CERTAIN))
+    if not len(reach):
+        return np.zeros(0, dtype=np.bool_)
+    place = planes.centre[:, :2]
+    _, bend = ground.region_bounds((place - reach[:, None]).min(axis=0), (place + reach[:, None]).max(axis=0))
+    sure = planes.upright & (bend * reach < _CERTAIN)
+    rest = np.flatnonzero(~sure)
+    if len(rest):
+        at = Section(*(getattr(foot, f.name)[rest] for f in fields(Section)))
+        known = _known(ground, planes.take(rest), at, np.zeros(len(rest)), reach[rest])
+        bends = np.maximum(np.abs(known.low), np.abs(known.high))
+        sure[rest] = known.valid & (bends * reach[rest] < _CERTAIN)
+    return sure
 
 
 def nearest(ground: Terrain, planes: Planes, guess: Array) -> Found:
