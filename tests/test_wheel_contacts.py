@@ -248,7 +248,8 @@ def test_far_from_the_origin_nothing_is_lost() -> None:
     "make, words",
     [
         (lambda: pose(bp.snake(4, 0.1), bp.Plane(), (0, 0)), ["no wheels"]),
-        (lambda: pose(ROBOT, bp.Profile(floor=0.0), (0, 0)), ["profile", "plane, surface and height_map"]),
+        (lambda: pose(ROBOT, bp.Profile(floor=0.0, ceiling=1.0), (0, 0)), ["ceiling", "open sky"]),
+        (lambda: pose(ROBOT, bp.Corridor(width=2.0, height=1.0), (0, 0)), ["corridor", "height_map and profile"]),
         (lambda: pose(ROBOT, bp.Plane(), (0, 0, 0)), ["position", "(..., 2)"]),
         (lambda: pose(ROBOT, bp.Plane(), (0, 0), 0.1, "relative"), ["height_mode", "relative", "absolute"]),
         (lambda: pose(ROBOT, bp.Plane(), (0, 0), roll=1.6), ["roll", "pi/2"]),

@@ -6,8 +6,8 @@ import pytest
 import bodyplan as bp
 from bodyplan.gaits.carry import pose, pose_of, wheel_rates
 from bodyplan.gaits.carry.contact import find
-from bodyplan.gaits.carry.planes import terrain
 from bodyplan.gaits.carry.pose import planes_of
+from bodyplan.gaits.carry.terrain import terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.spatial import compose, exp, rotate
 

@@ -50,7 +50,7 @@ class Claim:
     * ``rim_touches``: every rim of ``contacts`` (names) touches the ground, to ``tolerance`` m, and is nowhere below
       it, at the ``samples`` given (indices; all where there are none).
     * ``rolls``: where the rims of ``contacts`` touch they slip along their way at most the share ``tolerance`` of the
-      speed of their hubs (root mean square).
+      speed of their hubs, in 95 % of the samples.
     * ``clears``: the boxes of ``contacts`` keep ``required`` m from the ground, at the ``samples`` given.
     * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).
     """

@@ -10,6 +10,7 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray
 from bodyplan.check.report import Line
 from bodyplan.errors import InputError
+from bodyplan.ground import Profile
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.elements import Contact
@@ -22,11 +23,13 @@ Test = Callable[[Motion, Array, Claim], Line]
 #: whether it touches; and to see where it rolls
 TOUCHING, ROLLING = (512, 4), (96, 1)
 #: points of each closer look, and how many looks
-CLOSER, LOOKS = 33, 3
+CLOSER, LOOKS = 33, 4
 #: points along each side of a face of a box
 SIDE = 21
 #: places handled at once
 CHUNK = 400_000
+#: share of the samples of a wheel that must roll as claimed
+MOST = 0.95
 #: rad that a hub may turn between two samples, for its spin to be told from them
 COARSE = 1.5
 EXACT = 1e-9
@@ -101,9 +104,10 @@ def rolls(motion: Motion, positions: Array, claim: Claim) -> Line:
     typical = float(np.sqrt(np.mean(np.square(speeds))))
     if not typical > 0.0:
         return Line(claim.label, None, None, "", None, "nothing moves", kind=claim.kind)
-    value, limit = float(np.sqrt(np.mean(np.square(slips)))) / typical, float(claim.data["tolerance"])
-    worst = claim.data["contacts"][int(np.mean(np.square(slips), axis=1).argmax())]
-    detail = f"root mean square, share of {typical:.3g} m/s; worst: {worst}"
+    share = np.quantile(np.abs(slips), MOST, axis=1) / typical
+    k, limit = int(share.argmax()), float(claim.data["tolerance"])
+    value = float(share[k])
+    detail = f"share of {typical:.3g} m/s, all but 5 % of the samples; worst: {claim.data['contacts'][k]}"
     return Line(claim.label, value, limit, "", value <= limit, detail, kind=claim.kind)
 
 
@@ -123,7 +127,7 @@ def clears(motion: Motion, positions: Array, claim: Claim) -> Line:
         step = max(1, CHUNK // len(local))
         for first in range(0, len(samples), step):
             points = apply(pose[first : first + step, None], local)
-            height = points[..., 2] - motion.ground.height(points)
+            height = _over(motion.ground, points)
             lowest = height.argmin(axis=1)[:, None]
             below = np.take_along_axis(points, lowest[..., None], axis=1)[:, 0]
             gap = np.take_along_axis(height, lowest, axis=1)[:, 0] * motion.ground.normal(below)[:, 2]
@@ -156,7 +160,7 @@ def _lowest_of(
     def over(angles: Array) -> tuple[Array, Array]:
         circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
         points = apply(pose[:, None], np.asarray(contact.start) + radius[:, None, None] * circle)
-        return points[..., 2] - ground.height(points), points
+        return _over(ground, points), points
 
     width = 2.0 * np.pi / around
     angles = np.broadcast_to(np.arange(around) * width, (len(pose), around))
@@ -176,6 +180,14 @@ def _lowest_of(
             better = found < best
             best, where = np.where(better, found, best), np.where(better[:, None], points[rows, least], where)
     return best, where
+
+
+def _over(ground: Ground, points: Array) -> Array:
+    """Height (...,) m of points (..., 3) over the ground; over a profile their distance from it: beside an upright face
+    height says nothing."""
+    if isinstance(ground, Profile):
+        return ground.clearance(points)
+    return np.asarray(points[..., 2] - ground.height(points))
 
 
 def _box_points(contact: Contact) -> Array:

@@ -51,6 +51,11 @@ class Profile(Ground):
         """The x of all steps of floor and ceiling (k,), ascending, in m."""
         return frozen(np.union1d(self._floor_x, self._ceiling_x))
 
+    @property
+    def floor_levels(self) -> tuple[Array, Array]:
+        """The x of the floor's steps (k,), ascending, and the levels (k + 1,) between them, m."""
+        return self._floor_x, self._floor_z
+
     def ceiling_height(self, x: ArrayLike) -> Array:
         """Ceiling z (...,) in m at x (...,); inf where it is open."""
         at = finite(x, "x")

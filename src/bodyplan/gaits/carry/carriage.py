@@ -13,8 +13,8 @@ from bodyplan.errors import InputError
 from bodyplan.gaits.carry.laws import Law
 from bodyplan.gaits.carry.orientation import Function, Turning, turning
 from bodyplan.gaits.carry.paths import Course
-from bodyplan.gaits.carry.planes import Terrain
 from bodyplan.gaits.carry.rates import Carried
+from bodyplan.gaits.carry.terrain import Terrain
 from bodyplan.gaits.carry.wheels import Wheels
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.carry import newton, search
-from bodyplan.gaits.carry.planes import Planes, Section, Terrain, section
+from bodyplan.gaits.carry import newton, search, steps
+from bodyplan.gaits.carry.planes import Planes, Section, section
+from bodyplan.gaits.carry.terrain import Steps, Terrain
 from bodyplan.threads import shared
 
 #: outcomes
@@ -67,6 +68,8 @@ def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contact
 
 
 def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
+    if isinstance(ground, Steps):
+        return _on_steps(ground, planes)
     foot = section(ground, planes, np.zeros(len(planes)))
     outcome = np.full(len(planes), TOUCHES)
     outcome[foot.w >= 0.0] = AXLE_BELOW
@@ -83,6 +86,29 @@ def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
     if len(unsure):
         _search(ground, planes, unsure, settled[~sure], chi, radius, second, corner, outcome)
     return _measured(ground, planes, chi, radius, second, corner, outcome)
+
+
+def _on_steps(ground: Steps, planes: Planes) -> Contacts:
+    """Contacts with a floor in steps."""
+    outcome = np.full(len(planes), TOUCHES)
+    outcome[ground.field_jet(planes.centre[:, 0], planes.centre[:, 1])[0] >= planes.centre[:, 2]] = AXLE_BELOW
+    outcome[planes.flat] = LIES_FLAT
+    found = steps.nearest(ground, planes)
+    radius = np.hypot(found.s, found.w)
+    second = np.arctan2(found.other_s, -found.other_w) - planes.lean
+    point = planes.points(found.s, found.w)
+    with np.errstate(all="ignore"):
+        u = (point - planes.centre) / radius[:, None]
+        normal = np.where(found.edge[:, None], -u, found.normal)
+        # eq. (14): no part of the normal along the rim
+        off = np.abs(np.sum(normal * np.cross(u, np.cross(planes.ahead, planes.up)), axis=1))
+    level = np.abs(point[:, 2] - ground.field_jet(point[:, 0], point[:, 1])[0])
+    away = np.abs(point[:, :1] - ground.xs).min(axis=1, initial=np.inf)
+    residual = np.maximum(np.minimum(level, away), np.where(found.edge, 0.0, radius * off))
+    curvature = np.where(found.edge, -np.inf, 0.0)
+    none = np.zeros((len(planes), 2, 2))
+    phi = np.arctan2(found.s, -found.w) - planes.lean
+    return Contacts(phi, radius, point, normal, curvature, residual, second, found.edge, none, outcome)
 
 
 def _guess(foot: Section, planes: Planes, start: Array | None) -> tuple[Array, Array]:

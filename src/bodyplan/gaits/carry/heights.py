@@ -12,8 +12,8 @@ from bodyplan.errors import InputError
 from bodyplan.gaits.carry import hull
 from bodyplan.gaits.carry.carriage import Carriage, carriage
 from bodyplan.gaits.carry.orientation import Function
-from bodyplan.gaits.carry.planes import Terrain
 from bodyplan.gaits.carry.reach import heights
+from bodyplan.gaits.carry.terrain import Terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.ground.base import Ground
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
-from bodyplan.gaits.carry.planes import Terrain
+from bodyplan.gaits.carry.terrain import Terrain
 from bodyplan.robot.elements import Contact
 from bodyplan.robot.model import Robot
 

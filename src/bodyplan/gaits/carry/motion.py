@@ -14,10 +14,10 @@ from bodyplan.gaits.carry import contact, hull
 from bodyplan.gaits.carry.carriage import Carriage, carriage
 from bodyplan.gaits.carry.contact import Contacts
 from bodyplan.gaits.carry.heights import height_of
-from bodyplan.gaits.carry.planes import Terrain, terrain
 from bodyplan.gaits.carry.pose import WheelContact, planes_of, wheel_contact
 from bodyplan.gaits.carry.rates import Rates, rates
 from bodyplan.gaits.carry.report import claims, facts, notes
+from bodyplan.gaits.carry.terrain import Terrain, terrain
 from bodyplan.gaits.carry.verdict import judge
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.ground.base import Ground

@@ -20,7 +20,8 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.carry.planes import Planes, Terrain
+from bodyplan.gaits.carry.planes import Planes
+from bodyplan.gaits.carry.terrain import Terrain
 
 MOST_STEPS = 80
 #: m, as a share of how far from the origin: steps below it are rounding

@@ -13,87 +13,16 @@ A point at a distance R from the centre in the direction chi from straight down 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.errors import InputError
-from bodyplan.ground.base import Ground
-from bodyplan.ground.descent import JetFunction
-from bodyplan.ground.field import Field
-from bodyplan.ground.nearest import Bounds
-from bodyplan.ground.plane import Plane
+from bodyplan.gaits.carry.terrain import Terrain
 
 #: a plane whose ``up`` leans less counts as upright
 UPRIGHT = 1e-15
 _STEPS = 40
-
-
-class Terrain(Protocol):
-    """What contacts ask of a ground; see :class:`bodyplan.ground.field.Field`."""
-
-    def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """Height (n,), gradient (n, 2) and Hessian (n, 2, 2)."""
-
-    def field_bounds(self, low: Array, high: Array) -> Bounds:
-        """Bounds over boxes with corners (n, 2)."""
-
-    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
-        """Rate (n, 2, 2) of the Hessian for points that move by dx, dy (n,)."""
-
-    def region_bounds(self, low: Array, high: Array) -> tuple[float, float]:
-        """(highest ground, largest norm of its Hessian) over a box with corners (2,), loosely."""
-
-    def field_creases(self) -> Sequence[JetFunction]:
-        """Functions whose zeros are the lines where the ground has no derivative."""
-
-    @property
-    def field_box(self) -> Array:
-        """Corners (2, 2) of the rectangle on which the ground is given."""
-
-
-class _Slope:
-    """A plane as terrain."""
-
-    def __init__(self, plane: Plane) -> None:
-        self.level, self.slope = plane.level, np.array(plane.slope)
-
-    @property
-    def field_box(self) -> Array:
-        return np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
-
-    def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        g = np.empty((len(x), 2))
-        g[:] = self.slope
-        return self.level + self.slope[0] * x + self.slope[1] * y, g, np.zeros((len(x), 2, 2))
-
-    def field_bounds(self, low: Array, high: Array) -> Bounds:
-        ends = np.sort([low * self.slope, high * self.slope], axis=0).sum(axis=-1) + self.level
-        return Bounds(ends, np.zeros((2, len(low), 2, 2)), np.zeros(len(low)))
-
-    def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
-        return np.zeros((len(x), 2, 2))
-
-    def region_bounds(self, low: Array, high: Array) -> tuple[float, float]:
-        return float(self.field_bounds(low[None], high[None]).z[1, 0]), 0.0
-
-    def field_creases(self) -> Sequence[JetFunction]:
-        return ()
-
-
-def terrain(ground: Ground) -> Terrain:
-    """A ground that wheels can roll on. InputError for one that is no graph with second derivatives."""
-    if isinstance(ground, Plane):
-        return _Slope(ground)
-    if isinstance(ground, Field):
-        return ground
-    raise InputError(
-        f"ground: wheels roll on plane, surface and height_map; {ground.kind!r} has edges without a normal "
-        "(a smooth step is for example Surface('0.02*tanh(20*x)'))."
-    )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from bodyplan.arrays import Array, BoolArray, IntArray, TextArray, finite
 from bodyplan.errors import InputError, SolveError, Status, UnknownNameError
 from bodyplan.gaits.carry import contact, hull, orientation
 from bodyplan.gaits.carry.contact import Contacts
-from bodyplan.gaits.carry.planes import Planes, Terrain, terrain
+from bodyplan.gaits.carry.planes import Planes
+from bodyplan.gaits.carry.terrain import Terrain, terrain
 from bodyplan.gaits.carry.wheels import Wheel, Wheels
 from bodyplan.ground.base import Ground
 from bodyplan.robot.model import Robot

@@ -20,7 +20,7 @@ import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.gaits.carry.contact import TOUCHES, Contacts
-from bodyplan.gaits.carry.planes import Terrain
+from bodyplan.gaits.carry.terrain import Terrain
 
 #: slack 1 - kappa R below which the contact angle has no rate: the contact jumps
 JUMPS = 1e-7
@@ -90,8 +90,8 @@ def rates(ground: Terrain, found: Contacts, carried: Carried) -> Rates:
 def _on_smooth(ground: Terrain, found: Contacts, c: Carried, u: Array, t: Array) -> tuple[Array, Array, Array, Array]:
     """phi', R', phi'', R'' where the ground has a tangent."""
     R, H = found.radius, found.hessian
-    # any multiple of N serves; this one has z = 1
-    upright = np.where(found.corner, 1.0, found.normal[:, 2])
+    # any multiple of N serves; this one has z = 1, where the ground is not upright
+    upright = np.where(found.corner | (found.normal[:, 2] <= 0.0), 1.0, found.normal[:, 2])
     N = found.normal / upright[:, None]
     with np.errstate(all="ignore"):
         Nu = np.sum(N * u, axis=1)

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, BoolArray, finite
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.carry import contact, orientation
-from bodyplan.gaits.carry.planes import Planes, Terrain, section, terrain
+from bodyplan.gaits.carry.planes import Planes
 from bodyplan.gaits.carry.pose import MODES, planes_of, stands
+from bodyplan.gaits.carry.terrain import Terrain, terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.ground.base import Ground
 from bodyplan.robot.model import Robot
@@ -103,9 +104,10 @@ def heights(
 def _height_of(land: Terrain, planes: Planes, direction: Array, radius: Array) -> Array:
     """The height (n,) along ``direction`` (n, 3) at which wheels, at ``planes`` for height 0, touch with ``radius``
     (n,): Newton with dR/dh = -N . d / N . u, kept between bounds that only come nearer."""
-    foot = section(land, planes, np.zeros(len(planes)))
-    # the axle meets the ground a little below, and the radius is at most the gap
-    h = np.where(foot.found, (foot.w + radius) * planes.up[:, 2], np.nan)
+    with np.errstate(all="ignore"):
+        floor = land.field_jet(planes.centre[:, 0], planes.centre[:, 1])[0]
+    # from where the axle would be in the ground, and about the radius higher
+    h = np.where(np.isfinite(floor), floor - planes.centre[:, 2] + radius, np.nan)
     low, high = np.full(len(h), -np.inf), np.full(len(h), np.inf)
     active = np.flatnonzero(np.isfinite(h))
     step = np.zeros_like(h)
@@ -122,8 +124,12 @@ def _height_of(land: Terrain, planes: Planes, direction: Array, radius: Array) -
         low[active] = np.where((touches | sunk) & (miss < 0.0), np.fmax(low[active], h[active]), low[active])
         high[active] = np.where(touches & (miss >= 0.0), np.fmin(high[active], h[active]), high[active])
         u = (found.point - here.centre) / np.where(touches, found.radius, 1.0)[:, None]
-        slope = -np.sum(found.normal * d, axis=1) / np.sum(found.normal * u, axis=1)
-        trial = h[active] + np.where(touches, -miss / slope, radius[active])
+        with np.errstate(all="ignore"):
+            slope = -np.sum(found.normal * d, axis=1) / np.sum(found.normal * u, axis=1)
+            newton = -miss / slope
+        # along an upright face the radius does not change
+        way = np.where(touches & np.isfinite(newton), newton, np.copysign(radius[active], -miss))
+        trial = h[active] + way
         both = 0.5 * (low[active] + high[active])
         outside = (trial <= low[active]) | (trial >= high[active])
         trial = np.where(outside & np.isfinite(both), both, trial)

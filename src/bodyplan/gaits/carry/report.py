@@ -10,7 +10,7 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry import hull
 from bodyplan.gaits.carry.carriage import Carriage
-from bodyplan.gaits.carry.planes import Terrain
+from bodyplan.gaits.carry.terrain import Terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.motion import Claim
 from bodyplan.robot.elements import COS_30, WheelRadius
@@ -123,8 +123,8 @@ def notes(
     """Remarks for the reader."""
     yield from reasons
     yield (
-        "Each wheel touches the ground nearest to its axle in its plane, proved by bounds of the ground's second "
-        "derivatives; eqs. (12) and (14) alone hold at any stationary point, mirror images included."
+        "Each wheel touches the ground that is proved to be nearest to its axle in its plane; eqs. (12) and (14) alone "
+        "hold at any stationary point, mirror images included."
     )
     yield {
         "absolute": "The height is absolute, as in the paper's missions; eq. (6) would lay it along a normal.",

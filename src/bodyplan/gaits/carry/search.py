@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.carry.planes import Planes, Section, Terrain, section
+from bodyplan.gaits.carry.planes import Planes, Section, section
+from bodyplan.gaits.carry.terrain import Terrain
 
 #: relative error of the distance up to which the proof holds
 TOLERANCE = 1e-11

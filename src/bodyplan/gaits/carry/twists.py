@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.carry import contact
-from bodyplan.gaits.carry.planes import terrain
 from bodyplan.gaits.carry.pose import Pose, planes_of
 from bodyplan.gaits.carry.rates import Carried, rates
+from bodyplan.gaits.carry.terrain import terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.robot.elements import WheelRadius
 from bodyplan.spatial import matrix_from_quaternion

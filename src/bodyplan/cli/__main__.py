@@ -1,0 +1,3 @@
+from bodyplan.cli import main
+
+main()
