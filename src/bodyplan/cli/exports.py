@@ -8,27 +8,54 @@ from typing import Annotated
 import typer
 
 from bodyplan.cli.options import ForceOption, MotionArgument, SetOption, motion_of
-from bodyplan.terminal import bad_input
+from bodyplan.export import FORMATS
+from bodyplan.terminal import bad_input, number_or_text, print_table
+
+_NAMES = ", ".join(FORMATS)
+
+
+def _list(value: bool) -> None:
+    if value:
+        rows = [
+            [form.name, " ".join((form.suffix, *form.aliases)), form.about, form.extra or ""]
+            for form in FORMATS.values()
+        ]
+        print_table(["format", "suffix", "what it is", "extra"], rows)
+        raise typer.Exit()
 
 
 def export(
     mission: MotionArgument,
-    to: Annotated[str, typer.Option(help="Format: csv, npz or xml (MJCF).")],
-    out: Annotated[Path | None, typer.Option(help="File to write (default: NAME.FORMAT here).")] = None,
+    to: Annotated[str, typer.Option(metavar="FORMAT", help=f"{_NAMES} (see --list).")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write (default: NAME and the format's suffix here).")
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="KEY=VALUE", help="An option of the format, for example dtype=double."),
+    ] = None,
     set_: SetOption = None,
     force: ForceOption = False,
+    list_: Annotated[
+        bool, typer.Option("--list", callback=_list, is_eager=True, help="List the formats and what they are.")
+    ] = False,
 ) -> None:
-    """Write a motion in another format."""
+    """Write a motion in another format: for a robot, ROS 2, a 3D program, a simulator, a table."""
     with bad_input():
-        from bodyplan.errors import InputError, UnknownNameError
-        from bodyplan.export import FORMATS, save
+        from bodyplan.errors import InputError
+        from bodyplan.export import format_named, save
         from bodyplan.files import refuse_existing
 
-        suffix = "." + to.lower().lstrip(".")
-        if suffix not in FORMATS:
-            raise UnknownNameError("format", to, (name[1:] for name in FORMATS))
-        target = out if out is not None else Path(Path(mission).stem + suffix)
-        if target.suffix.lower() != suffix:
-            raise InputError(f"--out {target}: does not end in {suffix}.")
+        form = format_named(to)
+        suffixes = (form.suffix, *form.aliases)
+        target = out if out is not None else Path(Path(mission).resolve().stem + form.suffix)
+        if target.suffix.lower() not in suffixes:
+            raise InputError(f"--out {target}: does not end in {' or '.join(suffixes)}.")
+        options = {}
+        for text in option or ():
+            key, equals, value = text.partition("=")
+            if not equals or not key:
+                raise InputError(f"--option {text}: must be KEY=VALUE.")
+            options[key.strip()] = number_or_text(value.strip())
         refuse_existing(target, force)
-        typer.echo(save(motion_of(mission, set_), target))
+        typer.echo(save(motion_of(mission, set_), target, **options))

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 MissionArgument = Annotated[
     str, typer.Argument(help="A ready mission's name (see: bodyplan missions) or a .toml file.")
 ]
-MotionArgument = Annotated[str, typer.Argument(help="A mission, or a motion saved as .npz.")]
+MotionArgument = Annotated[
+    str, typer.Argument(help="A mission, a motion saved as .npz, or the folder of a run, for example runs/concertina.")
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a field, for example gait.omega=1.1. May be repeated."),
@@ -22,15 +24,21 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Replace what is ther
 
 
 def motion_of(mission: str, overrides: list[str] | None) -> Motion:
-    """The motion in an .npz file, or the plan of a mission."""
-    from bodyplan.errors import InputError
+    """The motion in an .npz file or in the folder of a run, or the plan of a mission."""
+    from pathlib import Path
 
-    if mission.endswith(".npz"):
+    from bodyplan.errors import InputError
+    from bodyplan.missions import ready_missions
+
+    saved = Path(mission)
+    if mission not in ready_missions() and (saved / "motion.npz").is_file():
+        saved /= "motion.npz"
+    if saved.suffix == ".npz":
         from bodyplan.export import load
 
         if overrides:
             raise InputError("--set: a saved motion cannot be changed; give its mission instead.")
-        return load(mission)
+        return load(saved)
     from bodyplan.job import plan_mission
     from bodyplan.missions import load_mission
 
