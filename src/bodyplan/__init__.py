@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         walker,
     )
     from bodyplan.show import show
+    from bodyplan.show.inline import inline
     from bodyplan.simulate import Friction, Trial, simulate
     from bodyplan.solve import stability
 
@@ -118,6 +119,7 @@ _FACE = {
     "simulate": "simulate",
     "stability": "solve",
     "show": "show",
+    "inline": "show.inline",
     "load": "export",
     "save": "export",
     "load_mission": "missions",

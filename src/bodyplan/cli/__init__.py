@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bodyplan.cli import exports, fits, lists, models, runs
+from bodyplan.cli import doctor, exports, fits, lists, models, runs
 
 app = typer.Typer(
     name="bodyplan",
@@ -30,6 +30,7 @@ COMMANDS = (
     lists.missions,
     lists.robots,
     models.model,
+    doctor.doctor,
 )
 for _command in COMMANDS:
     app.command()(_command)
