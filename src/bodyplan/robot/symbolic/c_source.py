@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from bodyplan.files import refuse_existing, replacing
 from bodyplan.robot.model import Robot
-from bodyplan.robot.symbolic.code import arc_function, filled, identifier, identifiers, text, uses_arcs
+from bodyplan.robot.source_text import comment, filled, identifier, identifiers, indices, literal
+from bodyplan.robot.symbolic.code import arc_function, text, uses_arcs
 from bodyplan.robot.symbolic.program import Program, compute
 
 
@@ -184,13 +185,13 @@ def c_source(robot: Robot, frames: tuple[int, ...], name: str | None) -> CSource
     ]
     arcs = uses_arcs(line.value for line in program.lines if line.name is not None)
     words = {
-        "ABOUT": _comment(about),
-        "SHORT": _comment([f"Kinematics of the robot {robot.name}; see {word}.h. Written by bodyplan."]),
+        "ABOUT": comment(about),
+        "SHORT": comment([f"Kinematics of the robot {robot.name}; see {word}.h. Written by bodyplan."]),
         "BODY": "\n".join(_body(program)),
-        "JOINT_INDICES": _indices(f"{word.upper()}_Q_", identifiers((j.upper() for j in robot.joints), "J")),
-        "FRAME_INDICES": _indices(f"{word.upper()}_AT_", identifiers((f.upper() for f in targets), "F")),
-        "JOINT_NAMES": ",\n".join(f"    {_string(joint)}" for joint in robot.joints),
-        "FRAME_NAMES": ",\n".join(f"    {_string(target)}" for target in targets),
+        "JOINT_INDICES": indices(f"{word.upper()}_Q_", identifiers((j.upper() for j in robot.joints), "J")),
+        "FRAME_INDICES": indices(f"{word.upper()}_AT_", identifiers((f.upper() for f in targets), "F")),
+        "JOINT_NAMES": ",\n".join(f"    {literal(joint)}" for joint in robot.joints),
+        "FRAME_NAMES": ",\n".join(f"    {literal(target)}" for target in targets),
         "FIRST": _numbers(program.first),
         "JOINT_OF": _numbers(program.joint_of),
         "N_JOINTS": str(robot.n),
@@ -211,7 +212,7 @@ def _body(program: Program) -> list[str]:
     body: list[str] = []
     for line in program.lines:
         if line.name is None:
-            body.append(_comment([line.value], "    "))
+            body.append(comment([line.value], "    "))
         else:
             body.append(f"    const double {line.name} = {text(line.value, str)};")
     for c in range(len(program.positions)):
@@ -229,26 +230,5 @@ def _body(program: Program) -> list[str]:
 # --- pieces of C --------------------------------------------------------------------------------------------
 
 
-def _comment(paragraphs: Sequence[str], indent: str = "") -> str:
-    """A block comment; what would end it or start another is taken apart."""
-    lines: list[str] = []
-    for paragraph in paragraphs:
-        clean = paragraph.replace("\n", " ").replace("*/", "* /").replace("/*", "/ *")
-        lines.extend([clean] if clean.startswith(" ") else textwrap.wrap(clean, 110) or [""])
-    if len(lines) == 1:
-        return f"{indent}/* {lines[0]} */"
-    return "\n".join([f"{indent}/* {lines[0]}", *(f"{indent}   {line}".rstrip() for line in lines[1:]), f"{indent}*/"])
-
-
-def _indices(prefix: str, names: Sequence[str]) -> str:
-    return ",\n".join(f"    {prefix}{name} = {i}" for i, name in enumerate(names))
-
-
 def _numbers(values: Sequence[int]) -> str:
     return textwrap.indent("\n".join(textwrap.wrap(", ".join(map(str, values)), 100)), "    ")
-
-
-def _string(name: str) -> str:
-    """A C string literal of UTF-8 bytes; what C could read otherwise is written in octal."""
-    safe = {*range(32, 127)} - {ord(c) for c in '"\\?'}
-    return '"' + "".join(chr(byte) if byte in safe else f"\\{byte:03o}" for byte in name.encode()) + '"'

@@ -1,14 +1,13 @@
-"""Expressions as text that C and NumPy both read, and names that both allow."""
+"""Expressions as text that C and NumPy both read."""
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import sympy as sp
 
+from bodyplan.robot.source_text import filled
 from bodyplan.robot.symbolic.program import ARC_C
 from bodyplan.spatial.coefficients import SERIES_BELOW, c_series
 
@@ -51,28 +50,3 @@ def arc_function(function: Callable[[str], str], template: str, near: str, far: 
     library's own series."""
     series = _text(c_series(sp.Symbol(near)), function)
     return filled(template, {"BELOW": repr(SERIES_BELOW), "SERIES": series, "CLOSED": f"(1.0 - a) / {far}"})
-
-
-def identifier(name: str, taken: Iterable[str] = (), prefix: str = "x") -> str:
-    """``name`` with what C and Python do not allow in a name replaced by underscores, not among ``taken``."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-    word = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
-    if not word or word[0].isdigit():
-        word = f"{prefix}_{word}".rstrip("_")
-    taken, unique, count = set(taken), word, 2
-    while unique in taken:
-        unique, count = f"{word}_{count}", count + 1
-    return unique
-
-
-def identifiers(names: Iterable[str], prefix: str) -> list[str]:
-    """An identifier of its own for each name."""
-    out: list[str] = []
-    for name in names:
-        out.append(identifier(name, out, prefix))
-    return out
-
-
-def filled(template: str, words: dict[str, str]) -> str:
-    """A template with its words in capitals replaced, all at once; a word may be the beginning of a longer name."""
-    return re.sub(rf"\b({'|'.join(words)})(?=\b|_)", lambda found: words[found[1]], template)

@@ -6,7 +6,8 @@ import textwrap
 from pprint import pformat
 
 from bodyplan.robot.model import Robot
-from bodyplan.robot.symbolic.code import arc_function, filled, identifiers, text, uses_arcs
+from bodyplan.robot.source_text import filled, identifiers
+from bodyplan.robot.symbolic.code import arc_function, text, uses_arcs
 from bodyplan.robot.symbolic.program import Program, compute
 
 HEAD = '''\

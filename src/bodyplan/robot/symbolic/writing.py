@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bodyplan.errors import InputError
 from bodyplan.files import refuse_existing, replacing
-from bodyplan.robot.symbolic.code import identifier
+from bodyplan.robot.source_text import identifier
 from bodyplan.robot.symbolic.model import SymbolicRobot
 
 
