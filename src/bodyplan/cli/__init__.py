@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bodyplan.cli import doctor, exports, fits, lists, models, runs
+from bodyplan.cli import doctor, exports, fits, lists, models, reports, runs
 
 app = typer.Typer(
     name="bodyplan",
@@ -25,6 +25,7 @@ app = typer.Typer(
 COMMANDS = (
     runs.run,
     runs.check,
+    reports.report,
     exports.export,
     fits.fit,
     lists.missions,
