@@ -1,4 +1,5 @@
-"""Resolved rates: which joint rates move the body and the feet as wanted, and what to do with the freedom left.
+"""Resolved rates: which joint rates move the body and the feet as wanted, and what to do with the freedom left. And
+forces of the ground on contacts, within friction cones: :mod:`bodyplan.solve.statics`.
 
     import bodyplan as bp
     import numpy as np
@@ -30,18 +31,32 @@ from bodyplan.solve.metric import Metric
 from bodyplan.solve.partitions import Partition, partition
 from bodyplan.solve.rates import Rates
 from bodyplan.solve.resolution import resolve
+from bodyplan.solve.statics import (
+    ContactForces,
+    RequiredFriction,
+    TorqueInterval,
+    contact_forces,
+    required_friction,
+    torque_interval,
+)
 
 __all__ = [
+    "ContactForces",
     "Limits",
     "Metric",
     "Model",
     "Partition",
     "Rates",
+    "RequiredFriction",
+    "TorqueInterval",
+    "contact_forces",
     "coordinate_jacobian",
     "coordinates_from_pose",
     "model",
     "partition",
     "pose_from_coordinates",
+    "required_friction",
     "resolve",
     "stability",
+    "torque_interval",
 ]

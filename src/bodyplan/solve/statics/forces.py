@@ -1,0 +1,140 @@
+"""``bp.solve.contact_forces``: what the ground does to each contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bodyplan.arrays import Array
+from bodyplan.errors import InputError, Status, UnknownNameError
+from bodyplan.solve.statics.cones import CONE, RAY, Cones, ratios
+from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, balance, friction
+from bodyplan.solve.statics.factor import Factor, Family, least_factor
+from bodyplan.solve.statics.item import Solved, at_least_factor, solve_item
+from bodyplan.solve.statics.outcome import Outcome, shaped
+
+OBJECTIVES = ("min_norm", "min_ratio")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactForces(Outcome):
+    """Forces of the ground on k contacts, over a batch (...,); single numbers and texts for a single item.
+
+    ``forces`` (..., k, 3) N in the world, nan where the status is not "ok". ``ratio`` (..., k): tangential over normal
+    force, 0 where a contact carries nothing; ``worst`` (...) the largest. ``residual`` (...): what they leave of force
+    and moment, as a share of the load. ``needed`` (...): the least friction coefficient, at every contact, with which
+    it would stand: where it slips; inf where it tips over whatever the friction, nan where it stands.
+
+    ``status`` (...): "slips" where more friction would do, "tips_over" where none would.
+    """
+
+    forces: Array
+    ratio: Array
+    worst: Any
+    residual: Any
+    needed: Any
+
+
+def contact_forces(
+    points: ArrayLike,
+    normals: ArrayLike,
+    com: ArrayLike,
+    weight: ArrayLike,
+    mu: ArrayLike,
+    objective: str = "min_norm",
+    *,
+    wrench: ArrayLike | None = None,
+    touching: ArrayLike | None = None,
+) -> ContactForces:
+    """Forces F of the ground on point contacts that hold a body in equilibrium, within Coulomb's cones.
+
+        sum F + weight + force = 0,   sum (p - com) x F + moment = 0,   |F_t| <= mu F . n   at every contact
+
+    ``points`` (..., k, 3) m; ``normals`` (..., k, 3) out of the ground, of any length; ``com`` (..., 3) m. ``weight``:
+    newtons downwards, along -z, as one number, or the force (..., 3) N that acts at ``com``. ``mu``: one number, or
+    (..., k). ``wrench`` (..., 6): a further force N and moment N m about ``com`` on the body; with - m a and minus the
+    rate of the angular momentum the motion is accounted for. ``touching`` (..., k) of True and False: contacts that do
+    not touch carry nothing, whatever their points and normals say. All broadcast over the batch.
+
+    ``objective``: "min_norm" takes the forces with the smallest sum of squares, which are unique; "min_ratio" those
+    whose worst ratio of tangential to normal force is the smallest, and of these again the smallest sum of squares.
+
+    Forces meet the conditions of optimality to rounding: a second-order cone program (Clarabel, the extra "solve")
+    shows which cones hold forces back, Newton's method does the rest. Where none does they are the pseudo-inverse's.
+    Paper *wheels* section 5, with sum F_z = + m g and F . n >= 0 in place of (25), (27), (28).
+
+    Raises InputError for shapes that do not go together, a normal of length zero, a negative weight or friction.
+    """
+    if objective not in OBJECTIVES:
+        raise UnknownNameError("objective", objective, OBJECTIVES)
+    k = _count(points)
+    given = friction(mu, k)
+    loads = Loads.of(points, normals, com, weight, wrench, touching, ("mu", given.shape[:-1]))
+    flat = np.broadcast_to(given, (*loads.shape, k)).reshape(-1, k)
+    x = smallest_free(loads, flat)
+    n = loads.count
+    status = np.full(n, Status.OK.value, dtype="<U16")
+    reasons, needed = np.full(n, "", dtype=object), np.full(n, np.nan)
+    start: Array | None = None
+    last: Factor | None = None
+    equations = loads.equations()
+    for i in range(n):
+        if loads.force[i] == 0.0 or (objective == "min_norm" and np.isfinite(x[i, 0, 0])):
+            continue
+        held, on = balance(equations[i], loads.load[i]), loads.touching[i]
+        if objective == "min_ratio" and held.left <= ROUNDING:
+            family = Family(np.ones(k), flat[i], on)
+            found = least_factor(held.A, held.b, family, last)
+            solved, last = _least_ratio(held, family, found, flat[i]), found
+        else:
+            solved = solve_item(held, flat[i], on, start)
+            start = solved.y if solved.status is Status.OK else None
+        x[i] = solved.x
+        status[i], reasons[i] = solved.status.value, solved.reason
+        needed[i] = np.nan if solved.status is Status.OK else solved.needed
+    ratio = np.where(loads.touching, ratios(x), 0.0)
+    ratio[status != Status.OK.value] = np.nan
+    return ContactForces(
+        forces=shaped(loads.newtons(x), loads.shape),
+        ratio=shaped(ratio, loads.shape),
+        worst=shaped(ratio.max(axis=1), loads.shape),
+        residual=shaped(loads.left_over(x), loads.shape),
+        needed=shaped(needed, loads.shape),
+        status=shaped(status, loads.shape),
+        reasons=shaped(reasons, loads.shape),
+    )
+
+
+def smallest_free(loads: Loads, mu: Array) -> Array:
+    """(n, k, 3) components of the smallest forces where these are within all cones mu (n, k), else nan."""
+    inverse = np.linalg.pinv(loads.equations(), rcond=1e-10)
+    x = -(inverse @ loads.load[..., None])[..., 0].reshape(loads.count, loads.contacts, 3)
+    kind = np.where(loads.touching, np.where(mu > 0.0, CONE, RAY), 0)
+    ray = np.broadcast_to([1.0, 0.0, 0.0], x.shape)
+    inside = Cones(kind, mu, ray).outside(x).max(axis=1) <= 1e-14 * np.abs(x).max(axis=(1, 2))
+    inside &= loads.left_over(x) <= ROUNDING
+    x[~inside] = np.nan
+    x[loads.force == 0.0] = 0.0
+    return np.asarray(x)
+
+
+def _least_ratio(held: Any, family: Family, found: Factor, mu: Array) -> Solved:
+    if np.isfinite(found.s) and found.s <= mu[family.touching].max() * (1.0 + 1e-11):
+        if not found.attained:
+            none = np.full((len(mu), 3), np.nan)
+            why = f"the worst ratio has no smallest value: it tends to {found.s:.4g} as forces grow without bound"
+            return Solved(Status.NOT_CONVERGED, none, family.at(found.s)[0], held, found.y, found.s, why)
+        solved = at_least_factor(held, family, found)
+        if solved is not None:
+            return solved
+    return solve_item(held, mu, family.touching)
+
+
+def _count(points: ArrayLike) -> int:
+    shape = np.shape(points)
+    if len(shape) < 2 or shape[-1] != 3:
+        raise InputError(f"points: expected shape (..., k, 3), got {shape}.")
+    return int(shape[-2])
