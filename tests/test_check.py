@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import bodyplan as bp
-from bodyplan.check.body import segment_distance
 from bodyplan.motion import Claim
+from bodyplan.spatial.segments import segment_distance
 
 
 @pytest.fixture(scope="module")

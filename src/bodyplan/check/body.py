@@ -1,17 +1,21 @@
-"""Tests that hold for every motion: solved, rates, limits, rigid links, the body against itself and the ground."""
+"""Tests that hold for every motion: solved, rates, limits, rigid links, the body against the ground."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.arrays import Array, BoolArray
 from bodyplan.check.claims import allowance
 from bodyplan.check.report import Line
+from bodyplan.check.shapes import box_gaps, skeletons
+from bodyplan.check.shapes import self_clearance as self_clearance
 from bodyplan.errors import Status
-from bodyplan.ground import HeightMap, Profile, Surface
+from bodyplan.ground import Profile
+from bodyplan.ground.base import Ground
+from bodyplan.ground.field import Field
+from bodyplan.ground.near import clearance_up_to
 from bodyplan.motion import Motion
 from bodyplan.robot.elements import Row
-from bodyplan.robot.neighbours import separate_contacts
 
 #: share of a joint's samples whose rate, or acceleration, may disagree with what is around them
 RATE_SLACK, ACCELERATION_SLACK = 0.15, 0.25
@@ -23,8 +27,6 @@ SMOOTH, FINE = 0.05, 0.01
 FEW = 50
 #: slack of lengths and limits
 EXACT = 1e-9
-#: samples times pairs of shapes handled at once
-CHUNK = 400_000
 
 
 def solved(motion: Motion) -> Line:
@@ -151,106 +153,49 @@ def link_lengths(motion: Motion, positions: Array) -> Line | None:
     return Line("link lengths kept", worst, EXACT, "m", worst <= EXACT, f"{count} links", kind="lengths")
 
 
-def _skeletons(motion: Motion) -> tuple[Array, Array, list[int]]:
-    """End points (T, c, 2, 3) of every capsule and sphere, radii (c,), and their indices among the contacts."""
-    poses = motion.robot.forward(motion.q, motion.base)
-    ends, radii, which = [], [], []
-    for k, contact in enumerate(motion.robot.contacts):
-        if contact.shape not in ("capsule", "sphere"):
-            continue
-        i = motion.robot.frame_index(contact.frame)
-        last = contact.end if contact.shape == "capsule" else contact.start
-        local = np.array([contact.start, last])
-        ends.append(np.einsum("tij,pj->tpi", poses.rotations[:, i], local) + poses.positions[:, None, i])
-        radii.append(contact.radius)
-        which.append(k)
-    size = len(motion.t)
-    return (np.stack(ends, axis=1) if ends else np.zeros((size, 0, 2, 3))), np.array(radii), which
-
-
-def segment_distance(p: Array, q: Array) -> Array:
-    """Smallest distance (...,) between segments p and q (..., 2, 3), exact also where they cross or degenerate."""
-    d1, d2, r = p[..., 1, :] - p[..., 0, :], q[..., 1, :] - q[..., 0, :], p[..., 0, :] - q[..., 0, :]
-    a, e, b = (d1 * d1).sum(-1), (d2 * d2).sum(-1), (d1 * d2).sum(-1)
-    c, f = (d1 * r).sum(-1), (d2 * r).sum(-1)
-    # the closest pair of two segments is at their crossing (if any) or has an end point in it
-    det = a * e - b * b
-    crossing = det > 1e-14 * np.maximum(a * e, 1e-300)
-    safe = np.where(crossing, det, 1.0)
-    s, u = (b * f - c * e) / safe, (a * f - b * c) / safe
-    inside = crossing & (s >= 0) & (s <= 1) & (u >= 0) & (u <= 1)
-    gap = r + s[..., None] * d1 - u[..., None] * d2
-    best = np.where(inside, (gap * gap).sum(-1), np.inf)
-    for point, seg in ((p[..., 0, :], q), (p[..., 1, :], q), (q[..., 0, :], p), (q[..., 1, :], p)):
-        along = seg[..., 1, :] - seg[..., 0, :]
-        square = (along * along).sum(-1)
-        x = ((point - seg[..., 0, :]) * along).sum(-1) / np.where(square > 0, square, 1.0)
-        off = point - seg[..., 0, :] - np.clip(x, 0.0, 1.0)[..., None] * along
-        best = np.minimum(best, (off * off).sum(-1))
-    return np.asarray(np.sqrt(best))
-
-
-def self_clearance(motion: Motion) -> Line | None:
-    """Smallest gap between two capsules or spheres that are no neighbours (``robot/neighbours.py``)."""
-    ends, radii, which = _skeletons(motion)
-    apart = _separate_pairs(motion, which)
-    if not len(apart):
-        return None
-    best, when, pair = np.inf, 0, apart[0]
-    step = max(1, CHUNK // len(apart))
-    first, second = apart[:, 0], apart[:, 1]
-    for k in range(0, len(motion.t), step):
-        gap = segment_distance(ends[k : k + step, first], ends[k : k + step, second]) - radii[first] - radii[second]
-        at = np.unravel_index(int(gap.argmin()), gap.shape)
-        if gap[at] < best:
-            best, when, pair = float(gap[at]), k + int(at[0]), apart[at[1]]
-    names = [motion.robot.contacts[which[i]].name for i in pair]
-    return Line(
-        "links clear of each other",
-        best,
-        0.0,
-        "m",
-        best >= -EXACT,
-        f"closest: {names[0]} and {names[1]} at {motion.t[when]:.4g} s",
-        at_least=True,
-        kind="self",
-    )
-
-
-def _separate_pairs(motion: Motion, which: list[int]) -> IntArray:
-    """Pairs of capsules and spheres that are no neighbours."""
-    place = {contact: i for i, contact in enumerate(which)}
-    pairs = [(place[a], place[b]) for a, b in separate_contacts(motion.robot) if a in place and b in place]
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
 def ground_clearance(motion: Motion) -> list[Line]:
-    """Gap between the capsules and spheres and the floor, and all ground; walls may be pressed as claimed.
+    """Gap between the shapes of the body and the floor, and all ground; walls may be pressed as claimed.
 
-    At five points along each capsule, and along the whole of it where the ground is a profile."""
-    ends, radii, which = _skeletons(motion)
-    if not len(which):
+    At five points along each capsule, and along the whole of it where the ground is a profile; of boxes as in
+    :func:`bodyplan.check.shapes.box_gaps`. Those that a claim "clears" is about are tested with it."""
+    contacts, ground = motion.robot.contacts, motion.ground
+    claimed = _cleared(motion)
+    ends, radii, which = skeletons(motion)
+    kept = [i for i, k in enumerate(which) if contacts[k].name not in claimed]
+    ends, radii, which = ends[:, kept], radii[kept], [which[i] for i in kept]
+    boxes = [k for k, contact in enumerate(contacts) if contact.shape == "box" and contact.name not in claimed]
+    if not which and not boxes:
         return []
     mix = np.array([0.0, 0.25, 0.5, 0.75, 1.0])[:, None]
+    if all(contacts[k].shape == "sphere" for k in which):
+        mix = mix[:1]
     points = ends[:, :, None, 0] * (1.0 - mix) + ends[:, :, None, 1] * mix
     surface = radii[None, :, None]
-    normal_z = motion.ground.normal(points[..., 0], points[..., 1])[..., 2]
-    above = (points[..., 2] - motion.ground.height(points[..., 0], points[..., 1])) * normal_z - surface
-    gap = motion.ground.clearance(points) - surface
-    floor = above
-    if isinstance(motion.ground, Profile):  # a corner of a step may reach through a link between two of the points
-        floor = motion.ground.floor_alone().segment_clearance(ends) - radii
-        gap = motion.ground.segment_clearance(ends) - radii
-    elif isinstance(motion.ground, (Surface, HeightMap)):  # curved: the tangent plane below a point is not the ground
-        floor = gap
-    lines = [_worst_gap(motion, which, floor, "clear of the floor", EXACT)]
+    normal_z = ground.normal(points[..., 0], points[..., 1])[..., 2]
+    above = (points[..., 2] - ground.height(points[..., 0], points[..., 1])) * normal_z - surface
+    floor = gap = above.min(axis=-1)
+    if isinstance(ground, Profile):  # a corner of a step may reach through a link between two of the points
+        floor = ground.floor_alone().segment_clearance(ends) - radii
+        gap = ground.segment_clearance(ends) - radii
+    elif isinstance(ground, Field):  # curved: the tangent plane below a point is not the ground
+        floor = gap = _nearest(ground, points, surface)
+    elif which:
+        gap = (ground.clearance(points) - surface).min(axis=-1)
+    if boxes:
+        alone = ground.floor_alone() if isinstance(ground, Profile) else ground
+        floor, gap = (
+            np.concatenate([found, _boxes(motion, boxes, under)], axis=1)
+            for found, under in ((floor, alone), (gap, ground))
+        )
+    every = [*which, *boxes]
+    lines = [_worst_gap(motion, every, floor, "clear of the floor", EXACT)]
     lies = allowance(motion, "on_floor")
-    if lies is not None:
+    if lies is not None and which:
         lines.append(_lies(motion, which, above, float(lies["tolerance"])))
     presses = allowance(motion, "presses", {})
     depth = float(presses.get("depth", 0.0))
-    if depth > 0.0:
-        line = _worst_gap(motion, which, gap, f"presses on the {presses['role']} no deeper than planned", depth + EXACT)
+    if depth > 0.0 and which:
+        line = _worst_gap(motion, every, gap, f"presses on the {presses['role']} no deeper than planned", depth + EXACT)
         deepest = float(radii.min())
         shallow = depth < deepest
         lines.append(
@@ -266,8 +211,32 @@ def ground_clearance(motion: Motion) -> list[Line]:
             )
         )
     elif np.any(np.abs(gap - floor) > EXACT):
-        lines.append(_worst_gap(motion, which, gap, "clear of walls and ceiling", EXACT))
+        lines.append(_worst_gap(motion, every, gap, "clear of walls and ceiling", EXACT))
     return lines
+
+
+def _cleared(motion: Motion) -> set[str]:
+    """Names of the shapes that a claim wants to be clear of the ground at all samples."""
+    claims = [claim.data for claim in motion.claims if claim.kind == "clears"]
+    whole = [data for data in claims if data.get("samples") is None and float(data["required"]) >= 0.0]
+    return {str(name) for data in whole for name in data["contacts"]}
+
+
+def _nearest(ground: Field, points: Array, radii: Array) -> Array:
+    """Gaps (T, c) m of balls around ``points`` (T, c, p, 3): those that are no smaller than that of the ball least high
+    above the ground are not told apart from it."""
+    if not points.size:
+        return np.zeros(points.shape[:2])
+    over = points[..., 2] - ground.height(points) - radii
+    at = np.unravel_index(int(over.argmin()), over.shape)
+    most = float(ground.clearance(points[at])) - np.broadcast_to(radii, over.shape)[at]
+    return np.asarray((clearance_up_to(ground, points, most + radii + EXACT) - radii).min(axis=-1))
+
+
+def _boxes(motion: Motion, which: list[int], ground: Ground) -> Array:
+    """Gaps (T, k) m of boxes, indices ``which`` among the contacts, to a ground."""
+    robot, poses = motion.robot, motion.robot.forward(motion.q, motion.base)
+    return np.stack([box_gaps(ground, robot, robot.contacts[k], poses) for k in which], axis=1)
 
 
 def _lies(motion: Motion, which: list[int], above: Array, tolerance: float) -> Line:
