@@ -44,13 +44,13 @@ class BicubicSpline:
 
     def jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Value (n,), gradient (n, 2) and Hessian (n, 2, 2) at x, y (n,); edge cells continue outwards."""
-        u, v, cells = self._at(x, y)
-        d = _hermite(v) @ cells @ np.swapaxes(_hermite(u), -1, -2)
-        dx, dy = self.step
-        gradient = np.stack([d[:, 0, 1] / dx, d[:, 1, 0] / dy], axis=-1)
-        mixed = d[:, 1, 1] / (dx * dy)
-        hessian = np.stack([d[:, 0, 2] / dx**2, mixed, mixed, d[:, 2, 0] / dy**2], axis=-1)
-        return d[:, 0, 0] + self.level, gradient, hessian.reshape(-1, 2, 2)
+        from bodyplan.ground.spline_kernel import spline_jet
+
+        n = len(x)
+        value, gradient, hessian = np.empty(n), np.empty((n, 2)), np.empty((n, 2, 2))
+        places = (np.ascontiguousarray(v, dtype=np.float64) for v in (x, y))
+        spline_jet(self.nodes, float(self.step[0]), float(self.step[1]), *places, value, gradient, hessian)
+        return value + self.level, gradient, hessian
 
     def value(self, x: Array, y: Array) -> Array:
         """Value (n,) at x, y (n,); that of :meth:`jet`, for less."""
