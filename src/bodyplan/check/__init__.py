@@ -7,6 +7,7 @@ from dataclasses import replace
 from bodyplan.check import body
 from bodyplan.check.claims import test_claim
 from bodyplan.check.report import Line, Report
+from bodyplan.check.statics import torques_within
 from bodyplan.errors import InputError
 from bodyplan.motion import Motion
 
@@ -24,7 +25,12 @@ def check(motion: Motion) -> Report:
         body.link_lengths(motion, positions),
     ]
     lines += _gathered([test_claim(motion, positions, claim) for claim in motion.claims])
-    lines += [*body.rates_agree(motion), *body.joint_limits(motion), body.self_clearance(motion)]
+    lines += [
+        *body.rates_agree(motion),
+        *body.joint_limits(motion),
+        torques_within(motion),
+        body.self_clearance(motion),
+    ]
     try:
         lines += body.ground_clearance(motion)
     except InputError as error:  # off the map

@@ -9,8 +9,10 @@ import numpy as np
 
 from bodyplan import curves
 from bodyplan.arrays import Array
+from bodyplan.check.clears import clears
 from bodyplan.check.report import Line
-from bodyplan.check.rims import clears, rim_touches, rolls
+from bodyplan.check.rims import rim_touches, rolls
+from bodyplan.check.statics import bears, grips_ground, holds
 from bodyplan.check.support import polygon_margin
 from bodyplan.errors import UnknownNameError
 from bodyplan.motion import Claim, Motion
@@ -332,6 +334,9 @@ TESTS: dict[str, Callable[[Motion, Array, Claim], Line]] = {
     "rim_touches": rim_touches,
     "rolls": rolls,
     "clears": clears,
+    "holds": holds,
+    "grips_ground": grips_ground,
+    "bears": bears,
 }
 
 #: claims that a general test looks up

@@ -35,7 +35,7 @@ COARSE = 1.5
 EXACT = 1e-9
 
 
-def _on_the_map(test: Test) -> Test:
+def on_the_map(test: Test) -> Test:
     """A test that fails, and says so, where points that it looks at lie beyond the edge of the ground."""
 
     @wraps(test)
@@ -48,17 +48,17 @@ def _on_the_map(test: Test) -> Test:
     return tested
 
 
-@_on_the_map
+@on_the_map
 def rim_touches(motion: Motion, positions: Array, claim: Claim) -> Line:
     """Largest distance of a claimed rim's lowest point over the ground from it, above or below, at the claimed samples:
     the rim touches and is nowhere below the ground where that is small. 512 points of a rim, and its four lowest places
     looked at more closely."""
-    samples = _samples(motion, claim)
+    samples = samples_of(motion, claim)
     if not len(samples):
-        return _none(claim)
+        return none_left(claim)
     worst, when, which = 0.0, int(samples[0]), ""
     for name in claim.data["contacts"]:
-        k, contact = _contact(motion, str(name))
+        k, contact = contact_of(motion, str(name))
         gaps = _lowest(motion, k, contact, samples, *TOUCHING)[0]
         i = int(np.abs(gaps).argmax())
         if not which or abs(gaps[i]) > abs(worst):
@@ -69,20 +69,20 @@ def rim_touches(motion: Motion, positions: Array, claim: Claim) -> Line:
     return Line(claim.label, value, limit, "m", value <= limit, detail, kind=claim.kind)
 
 
-@_on_the_map
+@on_the_map
 def rolls(motion: Motion, positions: Array, claim: Claim) -> Line:
     """How fast the material of the claimed rims slips along their way where they touch, root mean square, a share of
     the speed of their hubs; velocities are central differences of forward kinematics."""
     t = motion.t
     inner = np.arange(1, len(t) - 1)
     if not len(inner):
-        return _none(claim)
+        return none_left(claim)
     span = (t[2:] - t[:-2])[:, None]
     slips, speeds, coarse = [], [], 0.0
     poses = motion.robot.forward(motion.q, motion.base)
     radii = contact_radii(motion.robot, motion.q)
     for name in claim.data["contacts"]:
-        k, contact = _contact(motion, str(name))
+        k, contact = contact_of(motion, str(name))
         pose = poses[contact.frame]
         rotation = matrix_from_quaternion(pose[:, 3:])
         turn = np.einsum("tij,tkj->tik", rotation[2:], rotation[:-2])
@@ -111,17 +111,17 @@ def rolls(motion: Motion, positions: Array, claim: Claim) -> Line:
     return Line(claim.label, value, limit, "", value <= limit, detail, kind=claim.kind)
 
 
-@_on_the_map
+@on_the_map
 def clears(motion: Motion, positions: Array, claim: Claim) -> Line:
     """Smallest distance of points of the claimed boxes from the ground's tangent below them: of each sample's lowest
     one, 21 along each side of every face."""
-    samples = _samples(motion, claim)
+    samples = samples_of(motion, claim)
     if not len(samples):
-        return _none(claim)
+        return none_left(claim)
     poses = motion.robot.forward(motion.q[samples], motion.base[samples])
     least, when, which = np.inf, 0, ""
     for name in claim.data["contacts"]:
-        _, contact = _contact(motion, str(name))
+        _, contact = contact_of(motion, str(name))
         local = _box_points(contact)
         pose = poses[contact.frame]
         step = max(1, CHUNK // len(local))
@@ -199,15 +199,23 @@ def _box_points(contact: Contact) -> Array:
     return np.asarray(np.array(contact.start) + np.concatenate(faces) * np.array(contact.half))
 
 
-def _samples(motion: Motion, claim: Claim) -> IntArray:
+def lowest_points(motion: Motion, k: int, contact: Contact, samples: IntArray) -> Array:
+    """Where a rim is lowest over the ground (s, 3) m, at ``samples``."""
+    return _lowest(motion, k, contact, samples, *TOUCHING)[1]
+
+
+def samples_of(motion: Motion, claim: Claim) -> IntArray:
+    """The samples (s,) that a claim is about."""
     given = claim.data.get("samples")
     return np.arange(len(motion.t)) if given is None else np.asarray(given).astype(np.int64)
 
 
-def _contact(motion: Motion, name: str) -> tuple[int, Contact]:
+def contact_of(motion: Motion, name: str) -> tuple[int, Contact]:
+    """The number and the shape of a contact."""
     k = [contact.name for contact in motion.robot.contacts].index(name)
     return k, motion.robot.contacts[k]
 
 
-def _none(claim: Claim) -> Line:
+def none_left(claim: Claim) -> Line:
+    """The line of a claim without samples."""
     return Line(claim.label, None, None, "", None, "no sample falls into it", kind=claim.kind)

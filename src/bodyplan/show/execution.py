@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from bodyplan.robot.model import Robot
@@ -32,6 +33,9 @@ MANY = 8
 MEASURES = {
     "turned_rad": ("turned to the left of the planned heading, last cycle", "°"),
     "tilt_rad": ("tilted from the planned base, largest", "°"),
+    "height_rms_m": ("higher or lower than planned, rms", "m"),
+    "height_max_m": ("higher or lower than planned, at most", "m"),
+    "yaw_ratio": ("turn made / turn planned, by heading", "%"),
     "slip_angle_rad": ("slip angle: how far the body moves across its own axis", "°"),
     "tracking_rms_rad": ("servo error, rms", "rad"),
     "tracking_max_rad": ("servo error, largest", "rad"),
@@ -115,10 +119,19 @@ def _figures(trial: Trial, playback: Playback) -> list[tuple[str, str, str, str]
         least = min(lifts, key=lambda lift: lift.executed / lift.planned)
         rise, made = figure(least.planned, "m"), figure(least.executed, "m")
         rows.append(("rise of the part that is lifted least", rise, made, percent(trial.lift_ratio)))
-    return rows + [(what, "", _measure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if key in found]
+    return rows + [
+        (what, "", _measure(found[key], unit), "") for key, (what, unit) in MEASURES.items() if _shown(key, found)
+    ]
+
+
+def _shown(key: str, found: Mapping[str, Any]) -> bool:
+    """Whether a measure has a row: a ratio of turns only where one was planned."""
+    return key in found and not (key == "yaw_ratio" and found[key] is None)
 
 
 def _measure(value: float | None, unit: str) -> str:
+    if unit == "%":
+        return percent(value)
     return degrees(value) if unit == "°" else figure(value, unit)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bodyplan.errors import MissingExtraError
+from bodyplan.show.carrying_figures import wheels_above, wheels_maps
 from bodyplan.show.crawling import walk_figure
 from bodyplan.show.following_page import following_figure
 from bodyplan.show.grids import grid_figure
@@ -62,6 +63,8 @@ def figures(outcome: Outcome, playback: Playback) -> dict[str, Figure]:
         "torque": torque,
         "curve_and_mechanism": lambda o, p: following_figure(p.following, new_figure),
         "walk": lambda o, p: walk_figure(o.motion, new_figure),
+        "wheels_above": lambda o, p: wheels_above(p.carrying, new_figure),
+        "wheels_maps": lambda o, p: wheels_maps(p.carrying, new_figure),
         "side_views": lambda o, p: side_views(p.inching, new_figure),
         "footholds": lambda o, p: footholds(p.inching, new_figure),
         "contacts": lambda o, p: schedule_figure(p, new_figure),

@@ -11,6 +11,7 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.motion import Motion
 from bodyplan.robot.masses import center_from_poses
 from bodyplan.robot.model import Robot
+from bodyplan.show.carrying import Carrying
 from bodyplan.show.following import Following
 from bodyplan.show.inching import Inching, NotShown
 from bodyplan.simulate.loop import Timing
@@ -94,6 +95,11 @@ class Playback:
     def inching(self) -> Inching | NotShown | None:
         """How the body stands on its anchors; None for a gait that has none."""
         return Inching.of(self.motion, self.span, self.period is not None)
+
+    @cached_property
+    def carrying(self) -> Carrying | None:
+        """What the wheels of a carried body do; None for other gaits."""
+        return Carrying.of(self.motion)
 
     def advance(self, centre: Array) -> Array:
         """How far (k,) m centres of mass (k, 3) at the first k times have come along the planned direction

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bodyplan.arrays import Array
+from bodyplan.show.carrying_plots import carrying_plots
 from bodyplan.show.crawling import crawling_plots
 from bodyplan.show.figures import STRIPES, peak_and_rms
 from bodyplan.show.following_page import following_plots
@@ -56,6 +57,7 @@ def plots(outcome: Outcome, playback: Playback) -> dict[str, Plot]:
         **following_plots(playback.following),
         **inching_plots(outcome, playback),
         **crawling_plots(outcome.motion),
+        **carrying_plots(outcome, playback.carrying),
     }
     for group in joint_groups(playback.motion):
         made[f"angles_{group.kind}"] = heat_map(playback, group, playback.motion.q, f"joint {group.kind}", group.unit)

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from bodyplan.errors import InputError
 from bodyplan.files import replacing
 from bodyplan.show import sections
+from bodyplan.show.carrying_page import carrying_section
 from bodyplan.show.crawling import crawling_section
 from bodyplan.show.document import document
 from bodyplan.show.execution import execution
@@ -68,6 +69,7 @@ def page(outcome: Outcome, playback: Playback, drawn: Mapping[str, str]) -> str:
         "Planned and executed": execution(outcome, playback),
         "On its anchors": inching_section(outcome, playback, drawn),
         "On its feet": crawling_section(outcome.motion, drawn),
+        "On its wheels": carrying_section(playback.carrying, drawn, paper=bool(outcome.paper)),
         "Comparison": sections.comparison(outcome),
         "Beside the paper": sections.beside_the_paper(outcome),
         "Grid": grid_section(outcome.grid, outcome.name),

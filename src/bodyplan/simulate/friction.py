@@ -12,11 +12,10 @@ from bodyplan.arrays import Array, BoolArray, IntArray, number
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Solid
 from bodyplan.robot.elements import Contact
+from bodyplan.robot.friction import DEFAULT
 
 #: horizontal part of a unit axis below which it is upright
 UPRIGHT = 1e-6
-#: coefficient where neither the ground, nor the contact, nor the caller names one
-DEFAULT = 0.5
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ def as_friction(value: Any) -> float | Friction | None:
 
 def pair_friction(solid: Solid, contact: Contact, floor: float | Friction | None) -> tuple[float, float]:
     """Coefficients (along, across) of a contact on a solid: that of the caller on the floor, or else of the
-    solid, or else of the contact, or else :data:`DEFAULT`."""
+    solid, or else of the contact, or else 0.5."""
     if solid.role == "floor" and floor is not None:
         return (floor.backward, floor.sideways) if isinstance(floor, Friction) else (floor, floor)
     plain = next((mu for mu in (solid.friction, contact.friction) if mu is not None), DEFAULT)

@@ -9,9 +9,10 @@ import numpy as np
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Solid
 from bodyplan.robot.elements import Contact
+from bodyplan.robot.friction import DEFAULT
 from bodyplan.robot.model import Robot
 from bodyplan.robot.neighbours import separate_contacts
-from bodyplan.simulate.friction import DEFAULT, Balls, Friction, Runners, Scales, pair_friction
+from bodyplan.simulate.friction import Balls, Friction, Runners, Scales, pair_friction
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.wheels import TIPS, tip_names
 from bodyplan.spatial.rotations import rotate

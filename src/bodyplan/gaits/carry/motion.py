@@ -14,6 +14,7 @@ from bodyplan.gaits.carry import contact, hull
 from bodyplan.gaits.carry.carriage import Carriage, carriage
 from bodyplan.gaits.carry.contact import Contacts
 from bodyplan.gaits.carry.heights import height_of
+from bodyplan.gaits.carry.holding import hold, holding_claims, holding_facts, holding_notes, judged
 from bodyplan.gaits.carry.pose import WheelContact, planes_of, wheel_contact
 from bodyplan.gaits.carry.rates import Rates, rates
 from bodyplan.gaits.carry.report import claims, facts, notes
@@ -66,9 +67,12 @@ def motion_of(gait: Carry, robot: Robot, ground: Ground, t: Array) -> Motion:
     spin(wheels, land, at, t, rolled)
     under = hull.touches(robot, land, body.position, body.turn.matrix)
     verdict = judge(gait, wheels, body, rolled, under, t)
+    ok = verdict.ok
+    held = hold(wheels, ground, body, rolled, ok)
+    verdict = judged(verdict, held, t)
+    stood = holding_facts(wheels, held)
     contacts = np.zeros((len(t), len(robot.contacts)))
     contacts[:, [wheel.rim for wheel in wheels]] = 1.0
-    ok = verdict.status == Status.OK.value
     residual = np.nan_to_num(np.max([one.residual for one in rolled.wheels], axis=0))
     return Motion(
         robot=robot,
@@ -81,10 +85,12 @@ def motion_of(gait: Carry, robot: Robot, ground: Ground, t: Array) -> Motion:
         qdd=np.nan_to_num(rolled.qdd, posinf=0.0, neginf=0.0),
         residual=np.where(ok, residual, 0.0),
         status=verdict.status,
-        claims=tuple(claims(wheels, ok)),
+        claims=(*claims(wheels, ok), *holding_claims(wheels, held)),
         contacts=contacts,
-        facts=facts(gait, wheels, land, body, rolled, ok, t),
-        notes=tuple(notes(gait, wheels, body, rolled, ok, t, verdict.reasons)),
+        forces=None if isinstance(held, str) else held.contacts,
+        torques=None if isinstance(held, str) else held.torques,
+        facts=facts(gait, wheels, land, body, rolled, ok, t) | stood,
+        notes=(*notes(gait, wheels, body, rolled, ok, t, verdict.reasons), *holding_notes(wheels, held, stood)),
     )
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry import hull
 from bodyplan.gaits.carry.carriage import Carriage
+from bodyplan.gaits.carry.loads import paper_torque
 from bodyplan.gaits.carry.terrain import Terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.motion import Claim
-from bodyplan.robot.elements import COS_30, WheelRadius
 from bodyplan.robot.masses import center_of_mass
 from bodyplan.spatial.hulls import edge_distances
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 TOUCH = 1e-6
 #: share of the speed that a rim may slip ahead between two samples, as the judge sees it
 ROLLS = 0.02
-GRAVITY = 9.81
 #: rad: two axles that differ by less are parallel
 PARALLEL = 1e-6
 #: rad/s of turning and m/s of scrubbing that are worth a remark
@@ -68,7 +67,7 @@ def facts(
         out["smallest_adjust_angle"] = min(float(q.min()) for q in angles.values())
         out["largest_adjust_angle"] = max(float(q.max()) for q in angles.values())
         out["peak_adjust_rate"] = max(float(np.abs(rolled.qd[ok, wheel.adjust]).max()) for _, wheel in adjusted)
-        estimates = {wheel.name: _paper_torque(robot.mass, wheel.law, angles[wheel.name], len(wheels))
+        estimates = {wheel.name: np.abs(paper_torque(robot.mass, wheel, angles[wheel.name], len(wheels)))
                      for _, wheel in adjusted}  # fmt: skip
         out |= {f"{name}_paper_torque": float(torque.max()) for name, torque in estimates.items()}
         out["smallest_paper_torque"] = min(float(torque.min()) for torque in estimates.values())
@@ -96,13 +95,6 @@ def facts(
         feet = np.stack([one.point[ok, :2] for one in rolled.wheels], axis=1)
         out["support_margin"] = float(edge_distances(feet, centre).min())
     return out
-
-
-def _paper_torque(mass: float, law: WheelRadius | float, q: Array, count: int) -> Array:
-    """Size (T,) N m of the adjusting torque by the paper's estimate, eq. (35): every wheel carries an equal share of
-    the weight, straight up. It is not conservative: see the notes' correction 6."""
-    link = law.link if isinstance(law, WheelRadius) else 0.0
-    return np.asarray(0.5 * mass * GRAVITY / count * link * COS_30 * np.sin(0.5 * q))
 
 
 def _clearance(wheels: Wheels, land: Terrain, body: Carriage, ok: BoolArray) -> float | None:

@@ -29,6 +29,11 @@ class Verdict:
     status: TextArray
     reasons: tuple[str, ...]
 
+    @property
+    def ok(self) -> BoolArray:
+        """(T,) True where nothing failed."""
+        return np.asarray(self.status == Status.OK.value)
+
 
 def judge(gait: Carry, wheels: Wheels, body: Carriage, rolled: Rolled, under: BoolArray, t: Array) -> Verdict:
     """The status of every sample; ``under`` (T,) True where the hull touches the ground. What is asked for comes first,
