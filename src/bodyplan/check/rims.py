@@ -24,15 +24,12 @@ Test = Callable[[Motion, Array, Claim], Line]
 TOUCHING, ROLLING = (512, 4), (96, 1)
 #: points of each closer look, and how many looks
 CLOSER, LOOKS = 33, 4
-#: points along each side of a face of a box
-SIDE = 21
 #: places handled at once
 CHUNK = 400_000
 #: share of the samples of a wheel that must roll as claimed
 MOST = 0.95
 #: rad that a hub may turn between two samples, for its spin to be told from them
 COARSE = 1.5
-EXACT = 1e-9
 
 
 def on_the_map(test: Test) -> Test:
@@ -111,33 +108,6 @@ def rolls(motion: Motion, positions: Array, claim: Claim) -> Line:
     return Line(claim.label, value, limit, "", value <= limit, detail, kind=claim.kind)
 
 
-@on_the_map
-def clears(motion: Motion, positions: Array, claim: Claim) -> Line:
-    """Smallest distance of points of the claimed boxes from the ground's tangent below them: of each sample's lowest
-    one, 21 along each side of every face."""
-    samples = samples_of(motion, claim)
-    if not len(samples):
-        return none_left(claim)
-    poses = motion.robot.forward(motion.q[samples], motion.base[samples])
-    least, when, which = np.inf, 0, ""
-    for name in claim.data["contacts"]:
-        _, contact = contact_of(motion, str(name))
-        local = _box_points(contact)
-        pose = poses[contact.frame]
-        step = max(1, CHUNK // len(local))
-        for first in range(0, len(samples), step):
-            points = apply(pose[first : first + step, None], local)
-            height = _over(motion.ground, points)
-            lowest = height.argmin(axis=1)[:, None]
-            below = np.take_along_axis(points, lowest[..., None], axis=1)[:, 0]
-            gap = np.take_along_axis(height, lowest, axis=1)[:, 0] * motion.ground.normal(below)[:, 2]
-            if gap.min() < least:
-                least, when, which = float(gap.min()), first + int(gap.argmin()), contact.name
-    limit = float(claim.data["required"])
-    detail = f"{len(samples)} samples; closest: {which} at {motion.t[samples[when]]:.4g} s"
-    return Line(claim.label, least, limit, "m", least >= limit - EXACT, detail, at_least=True, kind=claim.kind)
-
-
 def _lowest(
     motion: Motion, k: int, contact: Contact, samples: IntArray, around: int, places: int
 ) -> tuple[Array, Array]:
@@ -188,15 +158,6 @@ def _over(ground: Ground, points: Array) -> Array:
     if isinstance(ground, Profile):
         return ground.clearance(points)
     return np.asarray(points[..., 2] - ground.height(points))
-
-
-def _box_points(contact: Contact) -> Array:
-    """Points (p, 3) of the faces of a box in its frame."""
-    a, b = (v.ravel() for v in np.meshgrid(*(np.linspace(-1.0, 1.0, SIDE) for _ in range(2))))
-    one = np.ones_like(a)
-    faces = [np.stack([sign * one if i == axis else (a if i == (axis + 1) % 3 else b) for i in range(3)], axis=1)
-             for axis in range(3) for sign in (-1.0, 1.0)]  # fmt: skip
-    return np.asarray(np.array(contact.start) + np.concatenate(faces) * np.array(contact.half))
 
 
 def lowest_points(motion: Motion, k: int, contact: Contact, samples: IntArray) -> Array:

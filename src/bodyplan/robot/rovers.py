@@ -14,7 +14,10 @@ from bodyplan.robot.elements import Body, Contact, Joint, Row, WheelRadius
 from bodyplan.robot.model import Robot
 
 QUARTER = 0.5 * math.pi
+NAMES = ("fl", "fr", "r")
 LINK, RUBBER, MASS, THICKNESS = 0.3, 0.02, 10.0, 0.02
+#: rubber on concrete (Table 1)
+RUBBER_FRICTION = 1.0
 
 
 class _Wheel(NamedTuple):
@@ -42,7 +45,7 @@ def tri_wheel(
     effort: float | None = None,
     spin_rate: float | None = None,
     spin_effort: float | None = None,
-    friction: float | None = 1.0,
+    friction: float | Mapping[str, float] | None = RUBBER_FRICTION,
     name: str = "tri_wheel",
 ) -> Robot:
     """The three-wheeled robot of paper *wheels* (Figs. 3 to 6, Table 1).
@@ -54,8 +57,8 @@ def tri_wheel(
 
     so that the body is 2 L_x long and 2 L_y wide; its hull is ``thickness`` m thick (the paper does not say; 0: none).
     ``link`` m is the length w of a wheel's legs, ``rubber`` m the height R_ru of its tread, ``mass`` kg of the whole.
-    ``friction`` of the rims is 1 as in Table 1. Joints, frames, contacts and the other options are those of
-    :func:`rover`, of which this is one. Raises InputError for a value out of range.
+    ``friction`` is 1 as in Table 1, also of wheels that a mapping does not name. Joints, frames, contacts and the other
+    options are those of :func:`rover`, of which this is one. Raises InputError for a value out of range.
     """
     x = number(half_length, "half_length", above=0.0)
     y = number(half_width, "half_width", above=0.0)
@@ -74,7 +77,9 @@ def tri_wheel(
         effort=effort,
         spin_rate=spin_rate,
         spin_effort=spin_effort,
-        friction=friction,
+        friction=friction
+        if not isinstance(friction, Mapping)
+        else {**dict.fromkeys(NAMES, RUBBER_FRICTION), **friction},
         name=name,
     )
 
@@ -95,7 +100,7 @@ def rover(
     effort: float | None = None,
     spin_rate: float | None = None,
     spin_effort: float | None = None,
-    friction: float | None = None,
+    friction: float | Mapping[str, float] | None = None,
     name: str = "rover",
 ) -> Robot:
     """A body on wheels of adjustable (paper *wheels*, eqs. (1), (7) to (11)) or fixed radius.
@@ -123,9 +128,10 @@ def rover(
 
     ``mass`` kg of the whole robot; all of it is at ``com`` (3,) m of the base as in the paper, except ``wheel_mass`` kg
     in each hub, taken for a ring of half the largest radius. Its moment of inertia is that of the hull, a solid box.
-    ``friction``: Coulomb coefficient of the rims and the hull.
+    ``friction``: Coulomb coefficient of the rims and the hull, or a mapping for the rims that it names.
 
-    Raises InputError for a value out of range, UnknownNameError for a radius, link or rubber of a wheel that is none.
+    Raises InputError for a value out of range, UnknownNameError for a radius, link, rubber or friction of a wheel that
+    is none.
     """
     if not isinstance(wheels, Mapping) or not wheels:
         raise InputError(f"wheels: expected wheel names with their (x, y) or (x, y, z, heading), got {wheels!r}.")
@@ -145,10 +151,12 @@ def rover(
 
     rows = {wheel: _contact_rows(wheel, made) for wheel, made in built.items()}
     rows |= {f"{wheel}.wheel": [_hub(wheel, made, spinning)] for wheel, made in built.items()}
-    contacts = [_rim(wheel, made, friction) for wheel, made in built.items()]
+    grips = {wheel: _of(wheel, wheels, friction, "friction", every=False) for wheel in built}
+    contacts = [_rim(wheel, made, grips[wheel]) for wheel, made in built.items()]
     if height > 0.0:
         half = (0.5 * length, 0.5 * width, 0.5 * height)
-        contacts.append(Contact("body", "base", "box", half=half, friction=friction))
+        hull = None if isinstance(friction, Mapping) else friction
+        contacts.append(Contact("body", "base", "box", half=half, friction=hull))
     x, y, z = finite(com, "com", (3,)).tolist()
     moments = (rest / 12.0 * (a**2 + b**2) for a, b in ((width, height), (length, height), (length, width)))
     xx, yy, zz = moments
