@@ -10,8 +10,8 @@ from bodyplan.arrays import Array
 
 @njit(cache=True, nogil=True)
 def spline_jet(nodes: Array, dx: float, dy: float, x: Array, y: Array, f: Array, g: Array, h: Array) -> None:
-    """Fill ``f`` (n,), ``g`` (n, 2), ``h`` (n, 2, 2) at ``x``, ``y`` (n,) for the Hermite data ``nodes`` (ny, nx, 2, 2);
-    edge cells continue outwards; nan where a place is not finite."""
+    """Fill ``f`` (n,), ``g`` (n, 2), ``h`` (n, 2, 2) at ``x``, ``y`` (n,) for the Hermite data ``nodes``
+    (ny, nx, 2, 2); edge cells continue outwards; nan where a place is not finite."""
     ny, nx = nodes.shape[0], nodes.shape[1]
     wx, wy = np.empty((3, 4)), np.empty((3, 4))
     for k in range(len(x)):
