@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         tri_wheel,
         walker,
     )
+    from bodyplan.search import optimise, sweep
     from bodyplan.show import show
     from bodyplan.show.inline import inline
     from bodyplan.simulate import Friction, Trial, simulate
@@ -124,6 +125,8 @@ _FACE = {
     "save": "export",
     "load_mission": "missions",
     "run": "job",
+    "sweep": "search",
+    "optimise": "search",
 }
 _MODULES = ("curves", "errors", "export", "fitting", "gaits", "ground", "rates", "robot", "solve", "spatial", "units")
 

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bodyplan.cli import doctor, exports, fits, lists, models, reports, runs
+from bodyplan.cli import doctor, exports, fits, lists, models, reports, runs, searches
 
 app = typer.Typer(
     name="bodyplan",
@@ -31,6 +31,8 @@ COMMANDS = (
     lists.missions,
     lists.robots,
     models.model,
+    searches.sweep,
+    searches.optimise,
     doctor.doctor,
 )
 for _command in COMMANDS:

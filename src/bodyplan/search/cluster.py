@@ -1,0 +1,198 @@
+"""The processes that work out points: dask.distributed, on this machine or on a running cluster."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from time import monotonic
+from typing import Any
+
+from bodyplan import __version__
+from bodyplan.errors import BodyplanError, InputError, MissingExtraError
+from bodyplan.search.payload import Payload
+from bodyplan.search.point import Row, evaluate
+
+#: points under way for each worker: enough that none waits for the next one
+AHEAD = 3
+#: s: how often to look whether workers have come or gone
+NEWS = 1.0
+#: s: how long a cluster may take to answer and to have a worker
+PATIENCE = 60.0
+#: most processes on one machine
+MOST_WORKERS = 512
+#: environment of workers on this machine: a point in each of them, not a point in all
+ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+LOST = "the process that worked it out ended {} times (stopped by the system, for want of memory perhaps)"
+#: a point to work out: its key and what is changed in the mission
+Job = tuple[str, Sequence[str]]
+
+
+class VersionError(BodyplanError):
+    """A worker runs another version of bodyplan than the one that sent the work."""
+
+
+class Pool:
+    """Workers that are there. ``rows`` gives them points and hands out what they find as it comes."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def rows(self, payload: Payload, jobs: Iterable[Job], simulate: bool) -> Iterator[tuple[str, Row]]:
+        """Key and row of each of ``jobs`` in the order in which they are finished, each exactly once.
+
+        A worker that ends costs no point: another one takes it; a point that ends several of them is "lost". Raises
+        BodyplanError where the workers cannot do the work at all.
+        """
+        # a task of its own, so that a worker that comes late or again gets the files from the scheduler's recipe
+        sent: Any = payload
+        if payload.files:
+            sent = self._client.submit(replace, payload, key=f"bodyplan-mission-{payload.content}")
+        waiting = iter(jobs)
+        done = distributed_().as_completed()
+        keys: dict[Any, str] = {}
+
+        def give() -> bool:
+            job = next(waiting, None)
+            if job is not None:
+                key, overrides = job
+                name = f"bodyplan-point-{key}"
+                future = self._client.submit(on_worker, __version__, sent, tuple(overrides), simulate, key=name)
+                keys[future] = key
+                done.add(future)
+            return job is not None
+
+        try:
+            room, asked = self._room(), monotonic()
+            while len(keys) < max(1, room) and give():
+                pass
+            for future in done:
+                yield keys.pop(future), _row_of(future)
+                if monotonic() - asked > NEWS:
+                    room, asked = self._room(), monotonic()
+                while len(keys) < max(1, room) and give():
+                    pass
+        finally:
+            self._client.cancel(list(keys))
+
+    def _room(self) -> int:
+        """Points that may be under way with the workers that there are now."""
+        return AHEAD * len(self._client.scheduler_info(-1)["workers"])
+
+
+def _row_of(future: Any) -> Row:
+    try:
+        row: Row = future.result()
+    except distributed_().KilledWorker:
+        import dask
+
+        return Row("lost", LOST.format(dask.config.get("distributed.scheduler.allowed-failures", 3) + 1))
+    except CancelledError as error:
+        raise BodyplanError("the cluster has gone; what is finished is kept, and the same command goes on.") from error
+    except BodyplanError:
+        raise
+    except Exception as error:
+        raise BodyplanError(
+            f"the workers cannot run bodyplan ({type(error).__name__}: {error}); they need the same bodyplan and "
+            "Python as this process."
+        ) from error
+    return row
+
+
+def on_worker(version: str, payload: Payload, overrides: Sequence[str], simulate: bool) -> Row:
+    """The row of a point, in a worker process. Raises VersionError in one of another version."""
+    if version != __version__:
+        raise VersionError(
+            f"a worker runs bodyplan {__version__}, this process {version}; install the same everywhere."
+        )
+    from numba import config
+
+    config.NUMBA_NUM_THREADS = 1  # type: ignore[attr-defined]  # workers share the machine; see bodyplan.threads
+    return evaluate(payload, overrides, simulate)
+
+
+@contextmanager
+def pool(workers: int | None = None, scheduler: str | None = None) -> Iterator[Pool]:
+    """Workers: those of the cluster at ``scheduler`` ("tcp://host:8786"), or ``workers`` processes here (default: one
+    a core). Raises MissingExtraError without dask.distributed, InputError where there is no cluster."""
+    distributed_()
+    if workers is not None and not 1 <= workers <= MOST_WORKERS:
+        raise InputError(f"workers: must be 1 to {MOST_WORKERS}, got {workers}.")
+    if workers is not None and scheduler is not None:
+        raise InputError("workers: a running cluster (scheduler) has its own; give one of the two.")
+    with ExitStack() as stack:
+        stack.enter_context(_quiet())
+        client = stack.enter_context(_running(scheduler) if scheduler is not None else _local(workers or _cores()))
+        yield Pool(client)
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    # a script that is not guarded is run again in each process that it starts
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise InputError(GUARD)
+    try:
+        cluster = distributed_().LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+            env=ONE_THREAD,
+        )
+    except RuntimeError as error:
+        raise InputError(f"the worker processes did not start ({error}). {GUARD}") from error
+    with cluster, distributed_().Client(cluster) as client:
+        yield client
+
+
+GUARD = 'A script that sweeps or optimises needs if __name__ == "__main__": around what it runs.'
+
+
+@contextmanager
+def _running(scheduler: str) -> Iterator[Any]:
+    try:
+        client = distributed_().Client(scheduler, timeout=PATIENCE)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"scheduler {scheduler!r}: no cluster answers there ({error}); an address is, for example, "
+            "tcp://192.168.1.5:8786."
+        ) from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError as error:
+            raise InputError(
+                f"scheduler {scheduler!r}: has no workers; start some with: dask worker {scheduler}"
+            ) from error
+        yield client
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Workers that come and go are the engine's business: rows say what became of the points."""
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def distributed_() -> Any:
+    """The library dask.distributed, or MissingExtraError."""
+    try:
+        import distributed
+    except ImportError as error:
+        raise MissingExtraError("dask.distributed", "cluster", "a search") from error
+    return distributed
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
