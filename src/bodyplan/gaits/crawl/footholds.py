@@ -16,9 +16,10 @@ AROUND = 12
 EXACT, HOLLOW, SETTLES = 1e-10, 1e-2, 20
 
 
-def foothold(ground: Ground, nominal: Array, radius: float, max_slope: float, search: float) -> tuple[Array, str]:
-    """Centre (3,) m of a ball of ``radius`` m on ground no steeper than ``max_slope`` rad at ``nominal`` (2,) m or as
-    near to it as can be within ``search`` m; and why there is none (the ball is at ``nominal`` then, if it can).
+def footholds(ground: Ground, nominal: Array, radius: float, max_slope: float, search: float) -> tuple[Array, str]:
+    """Centres (k, 3) m, the best first, of balls of ``radius`` m on ground no steeper than ``max_slope`` rad at
+    ``nominal`` (2,) m or as near to it as can be within ``search`` m; and why there is none (one ball is at ``nominal``
+    then, if it can).
 
     A search prefers footholds with room for the ball at its sides and ground all around it: no riser or edge within a
     radius."""
@@ -28,7 +29,7 @@ def foothold(ground: Ground, nominal: Array, radius: float, max_slope: float, se
         tried = np.concatenate([tried, nominal + (rings[:, None, None] * _ways(DIRECTIONS)).reshape(-1, 2)])
     there = _on(ground, tried)
     if not there.any():
-        return np.array([*nominal, radius]), "no ground " + _where(search)
+        return np.array([[*nominal, radius]]), "no ground " + _where(search)
     tried = tried[there]
     normals = ground.normal(tried)
     centres, stands = _settled(ground, tried, normals, radius)
@@ -36,11 +37,11 @@ def foothold(ground: Ground, nominal: Array, radius: float, max_slope: float, se
     good = np.flatnonzero(stands & flat)
     if not len(good):
         steep = f"the ground is steeper than {np.degrees(max_slope):.3g} deg, or an edge, {_where(search)}"
-        return centres[0], steep + ("" if search > 0.0 else '; foothold = "search" looks around')
+        return centres[:1], steep + ("" if search > 0.0 else '; foothold = "search" looks around')
     if search > 0.0:
         roomy = _roomy(ground, centres[good], radius, max_slope)
-        return centres[good[int(roomy.argmax())]], ""
-    return centres[good[0]], ""
+        good = np.concatenate([good[roomy], good[~roomy]])
+    return centres[good], ""
 
 
 def _where(search: float) -> str:

@@ -28,6 +28,8 @@ STEP_TIME, STRIDE, APART = 3.0, 0.35, 0.7
 #: share of the time in which some leg swings, if joints are fast enough: they have ROOM below their limits on level
 #: ground; and what the share may be where they are not
 SWINGING, ROOM, BOUNDS = 0.6, 0.85, (0.4, 0.85)
+#: share of a foot's radius that links and body keep off the ground
+KEEP = 0.5
 #: shares of a leg: height of the body and outward reach of the feet; height of a step, support margin and radius of a
 #: search for footholds (50, 20 and 50 mm for SILO4's 540 mm)
 HEIGHT, REACH, STEP_HEIGHT, MARGIN, SEARCH = 0.385, 0.333, 5.0 / 54.0, 2.0 / 54.0, 5.0 / 54.0
@@ -51,6 +53,9 @@ class Crawl(Gait):
     the distances from the edges less a cost of sway; "most", the largest margin.
 
     ``step_height`` m of a swing over its straight line (default 0.093 of a leg); more where the ground demands it.
+    ``clearance`` m that links and body keep off the ground where the robot has shapes for them (``shell``; default half
+    of a foot's radius; a shin that ends in its foot as much as it has on level ground): swings are raised for it, other
+    footholds within the search chosen, and the body raised.
     ``foothold``: "nearest", where the foot should be, or "search" within ``search_radius`` m (default 0.093 of a leg)
     for ground no steeper than ``max_slope`` rad, if it can be with neither riser nor edge within the foot's radius.
     ``height`` m of the body's frame over the feet's plane (default 0.385 of a leg), ``reach`` m of the feet outward
@@ -59,7 +64,8 @@ class Crawl(Gait):
 
     The centre of mass is that of the whole robot, swinging leg included. Statuses, from the time on when a step cannot
     be made: ``tips_over`` (no sway gives the margin), ``out_of_reach``, ``no_contact`` (no foothold), ``below_floor``
-    (no way over the ground), and ``limit`` where a joint is beyond its limits or too fast; ``motion.notes`` say which
+    (no way over the ground for a foot, a link or the body), ``links_crossing`` (two of them would be in each other),
+    and ``limit`` where a joint is beyond its limits or too fast; ``motion.notes`` say which
     leg. Raises InputError for values out of range and for robots whose chains are not legs with three actuated joints.
     """
 
@@ -70,6 +76,7 @@ class Crawl(Gait):
         "step_height": "length",
         "cycle_time": "time",
         "margin": "length",
+        "clearance": "length",
         "max_slope": "angle",
         "search_radius": "length",
         "height": "length",
@@ -90,6 +97,7 @@ class Crawl(Gait):
         sway: Any = "auto",
         stability: str = "margin",
         margin: float | None = None,
+        clearance: float | None = None,
         foothold: str = "nearest",
         search_radius: float | None = None,
         max_slope: float = 0.6,
@@ -128,6 +136,7 @@ class Crawl(Gait):
                 raise UnknownNameError(name, value, valid)
         self.stability, self.foothold, self.body = stability, foothold, body
         self.margin = None if margin is None else number(margin, "margin")
+        self.clearance = None if clearance is None else number(clearance, "clearance", at_least=0.0)
         self.search_radius = None if search_radius is None else number(search_radius, "search_radius", above=0.0)
         self.max_slope = number(max_slope, "max_slope", above=0.0, below=0.5 * np.pi)
         self.height = None if height is None else number(height, "height", above=0.0)
@@ -149,6 +158,7 @@ class Crawl(Gait):
             "sway": self.sway,
             "stability": self.stability,
             "margin": self.margin,
+            "clearance": self.clearance,
             "foothold": self.foothold,
             "search_radius": self.search_radius,
             "max_slope": self.max_slope,
@@ -203,6 +213,7 @@ class Crawl(Gait):
             margin=MARGIN * size if self.margin is None else self.margin,
             search=search if self.foothold == "search" else 0.0,
             offsets=offsets,
+            clearance=KEEP * min(leg.radius for leg in legs.legs) if self.clearance is None else self.clearance,
         )
 
     def _order(self, legs: Legs) -> tuple[int, ...]:

@@ -189,6 +189,7 @@ def _claims(planner: Planner, plan: Plan, t: Array, heights: Array, period: floa
     if planner.legs.robot.mass > 0.0:
         asked = planner.margin - BETWEEN if planner.gait.sway == "auto" else 0.0
         out.append(Claim("supported", "the centre of mass is over the standing feet", {"required": asked}))
+    out += _apart(planner)
     if period is not None and plan.status == Status.OK:
         turn = planner.course.yaw_rate * period
         (x0, y0), _ = planner.course.at(0.0)
@@ -197,6 +198,21 @@ def _claims(planner: Planner, plan: Plan, t: Array, heights: Array, period: floa
         advance = [float(x1 - (c * x0 - s * y0)), float(y1 - (s * x0 + c * y0)), 0.0]
         data = {"period": period, "advance": advance, "turn": turn, "tolerance": EXACT, "from_rest": True}
         out.append(Claim("periodic", "the cycle closes", data))
+    return out
+
+
+def _apart(planner: Planner) -> list[Claim]:
+    """What the planner kept off the ground, by half as much as it did at the places it looked at."""
+    if planner.shell is None:
+        return []
+    out = []
+    ends_in_foot = planner.needed < planner.shell.keep
+    for label, which in (("links and body clear of the ground", ~ends_in_foot), ("shins off the ground", ends_in_foot)):
+        parts = [int(part) for part in np.flatnonzero(which)]
+        if parts:
+            data = {"contacts": [planner.shell.name(part) for part in parts],
+                    "required": 0.5 * float(planner.needed[parts].min())}  # fmt: skip
+            out.append(Claim("clears", label, data))
     return out
 
 
@@ -216,6 +232,8 @@ def _facts(planner: Planner, plan: Plan, qd: Array, period: float | None) -> dic
     }
     if period is not None:
         out["period"] = period
+    if planner.shell is not None:
+        out["clearance"] = planner.clearance
     if plan.steps:
         out["support_margin"] = min(step.margin for step in plan.steps)
         out["largest_sway_share"] = max(step.share for step in plan.steps)

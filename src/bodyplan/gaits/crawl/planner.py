@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status
-from bodyplan.gaits.crawl.footholds import foothold
+from bodyplan.gaits.crawl.footholds import footholds
 from bodyplan.gaits.crawl.legs import Legs, stance_guess
-from bodyplan.gaits.crawl.steps import Course, Step, clear_swing, swing_path
+from bodyplan.gaits.crawl.shell import Shell
+from bodyplan.gaits.crawl.steps import Course, Step, blend, clear_swing, clear_swings, swing_path
 from bodyplan.ground.base import Ground
 from bodyplan.robot.masses import center_of_mass
 from bodyplan.spatial import quaternion_exp, rotate
@@ -27,6 +29,12 @@ SHARES = 41
 PLACES = np.linspace(0.0, 1.0, 9)
 #: weight of sway against the logarithms of the distances from the edges
 SWAY_COST = 0.5
+#: where a step is looked at for what links and body could touch: of the body's move, and of the swing
+MOVE, SWING = np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 33)
+#: what is tried where they come too near: so many footholds and swings, the body higher by such shares
+SPOTS, SWINGS, RISES = 25, 12, (0.0, 0.06, 0.12, 0.2)
+#: a share of sway with which steps to come are guessed
+AHEAD = 0.4
 #: most steps of one plan: a mistyped time should not eat the machine
 MOST_STEPS = 20_000
 #: m of distances that rounding may change
@@ -50,18 +58,23 @@ class Plan:
 
 @dataclass(frozen=True)
 class _Failure:
-    """Why there is no step, and from which time s on."""
+    """Why there is no step, and from which time s on. ``short`` m: by how much links or body come too near to anything,
+    0 where that is not why; ``elsewhere``: whether another foothold may help; ``made``: the step, where only later ones
+    may not be."""
 
     status: Status = Status.OK
     reason: str = ""
     time: float = np.inf
+    short: float = 0.0
+    elsewhere: bool = False
+    made: Step | None = None
 
 
 @dataclass
 class Planner:
     """Plans ``gait`` for ``legs`` on ``ground``, with the gait's numbers for this robot: ``order`` of the legs, s of
-    sway and swing, m of ``height``, ``lift``, ``margin`` and ``search`` (0: none), and ``offsets`` (m, 3) m of the feet
-    from the middle of the body, in its heading, on level ground."""
+    sway and swing, m of ``height``, ``lift``, ``margin``, ``search`` (0: none) and ``clearance``, and ``offsets``
+    (m, 3) m of the feet from the middle of the body, in its heading, on level ground."""
 
     gait: Crawl
     legs: Legs
@@ -75,12 +88,17 @@ class Planner:
     margin: float
     search: float
     offsets: Array
+    clearance: float = 0.0
     guess: Array = field(init=False)
+    shell: Shell | None = field(init=False)
+    needed: Array = field(init=False)
 
     def __post_init__(self) -> None:
         stance = self.offsets - [0.0, 0.0, self.height]
         q, _ = self.legs.place(stance[None], stance_guess(self.legs, stance))
         self.guess = q[0]
+        self.shell = Shell.of(self.legs, self.clearance)
+        self.needed = np.zeros(0) if self.shell is None else self.shell.needed(self.guess)
 
     @property
     def step_time(self) -> float:
@@ -97,14 +115,16 @@ class Planner:
         count = len(self.legs)
         feet, failure = np.zeros((count, 3)), _Failure()
         for place, leg in enumerate(self.order):
-            feet[leg], why = self._foothold(leg, place - count)
+            spots, why = self._footholds(leg, place - count)
+            feet[leg] = spots[0]
             if why:
                 reason = f"{self.legs.names[leg]} has no foothold to begin on: {why}"
                 failure = _Failure(Status.NO_CONTACT, reason, 0.0)
         first, begun = self._before(self.order[-1], feet), feet
         steps: list[Step] = []
         while failure.status == Status.OK and len(steps) * self.step_time < until:
-            step = self._step(self.order[len(steps) % count], len(steps), feet)
+            before = steps[-1].pose if steps else first
+            step = self._step(self.order[len(steps) % count], len(steps), feet, before)
             if isinstance(step, _Failure):
                 failure = step
             else:
@@ -116,48 +136,135 @@ class Planner:
         """Pose (6,) of the body at the end of the step before the first, in which ``leg`` has come to its place among
         ``feet`` (m, 3): so that a walk that repeats does so from the beginning."""
         before = feet.copy()
-        spot, why = self._foothold(leg, -1 - len(self.legs))
-        before[leg] = feet[leg] if why else spot
+        spots, why = self._footholds(leg, -1 - len(self.legs))
+        before[leg] = feet[leg] if why else spots[0]
         shape = clear_swing(self.ground, before[leg], feet[leg], self.lift, self.legs.legs[leg].radius)
         pose, _, _, _ = self._body(leg, -1, before, feet, shape or (self.lift, 1.0))
         return pose
 
-    def _step(self, leg: int, n: int, feet: Array) -> Step | _Failure:
-        """Step ``n``, in which ``leg`` swings while the others stay at ``feet`` (m, 3)."""
+    def _step(self, leg: int, n: int, feet: Array, before: Array) -> Step | _Failure:
+        """Step ``n``, in which ``leg`` swings while the others stay at ``feet`` (m, 3), after the body's pose
+        ``before`` (6,). If links or body come too near to anything, other swings, footholds and heights of the body are
+        tried; if nothing helps, what comes nearest to it says why."""
+        spots, why = self._footholds(leg, n)
+        if why:
+            begin = n * self.step_time
+            at = f"{self.legs.names[leg]} finds no foothold at {begin + self.sway_time:.4g} s"
+            return _Failure(Status.NO_CONTACT, f"{at}: {why}", begin)
+        spread = spots[np.unique(np.linspace(0, len(spots) - 1, SPOTS).astype(np.int64))]
+        best: _Failure | None = None
+        for rise in RISES:
+            doubtful: _Failure | None = None
+            for spot in spread:
+                step = self._tried(leg, n, feet, before, spot, rise * self.height)
+                if isinstance(step, Step):
+                    return step
+                if step.short == 0.0 and best is None and doubtful is None:
+                    return step
+                if step.made is not None and (doubtful is None or step.short < doubtful.short):
+                    doubtful = step
+                elif step.made is None and step.short > 0.0 and (best is None or step.short < best.short):
+                    best = step
+                if not step.elsewhere:
+                    break
+            if doubtful is not None and doubtful.made is not None:
+                return doubtful.made
+        assert best is not None
+        return best
+
+    def _tried(self, leg: int, n: int, feet: Array, before: Array, spot: Array, rise: float) -> Step | _Failure:
+        """Step ``n`` to ``spot`` (3,) with the body ``rise`` m higher than usual."""
         name, begin = self.legs.names[leg], n * self.step_time
         lift_off = begin + self.sway_time
         after = feet.copy()
-        after[leg], why = self._foothold(leg, n)
-        if why:
-            return _Failure(Status.NO_CONTACT, f"{name} finds no foothold at {lift_off:.4g} s: {why}", begin)
+        after[leg] = spot
         radius = self.legs.legs[leg].radius
-        shape = clear_swing(self.ground, feet[leg], after[leg], self.lift, radius)
-        if shape is None:
-            return _Failure(Status.BELOW_FLOOR, f"{name} cannot swing over the ground at {lift_off:.4g} s", begin)
-        pose, margin, share, reached = self._body(leg, n, feet, after, shape)
-        if not reached.all():
-            lost = self.legs.names[int(np.flatnonzero(~reached)[0])]
-            what = "its way" if lost == name else f"where {lost} stands"
-            reason = f"{what} is out of reach while {name} swings at {lift_off:.4g} s"
-            return _Failure(Status.OUT_OF_REACH, reason, begin)
-        if margin < self.margin - EXACT and self.gait.sway == "auto":
-            reason = (
-                f"no sway gives {self.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
-                f"most is {margin:.4g} m"
-            )
-            if len(self.legs) == 3:
-                reason += " (two feet are no support: a crawl needs four legs)"
-            return _Failure(Status.TIPS_OVER, reason, begin)
-        return Step(leg, begin, lift_off, lift_off + self.swing_time, pose, feet, after, *shape, margin, share)
+        best: _Failure | None = None
+        for swing in islice(clear_swings(self.ground, feet[leg], spot, self.lift, radius), SWINGS):
+            pose, margin, share, reached = self._body(leg, n, feet, after, swing, rise)
+            if not reached.all():
+                lost = self.legs.names[int(np.flatnonzero(~reached)[0])]
+                what = "its way" if lost == name else f"where {lost} stands"
+                reason = f"{what} is out of reach while {name} swings at {lift_off:.4g} s"
+                return best or _Failure(Status.OUT_OF_REACH, reason, begin)
+            if margin < self.margin - EXACT and self.gait.sway == "auto":
+                reason = (
+                    f"no sway gives {self.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
+                    f"most is {margin:.4g} m"
+                )
+                if len(self.legs) == 3:
+                    reason += " (two feet are no support: a crawl needs four legs)"
+                return best or _Failure(Status.TIPS_OVER, reason, begin)
+            touch_down = lift_off + self.swing_time
+            step = Step(leg, begin, lift_off, touch_down, pose, feet, after, *swing, margin, share)
+            failure, raising = self._touches(step, n, before)
+            if failure is None:
+                return step
+            if best is None or failure.short < best.short:
+                best = failure
+            if not raising:
+                break
+        reason = f"{name} cannot swing over the ground at {lift_off:.4g} s"
+        return best or _Failure(Status.BELOW_FLOOR, reason, begin)
 
-    def _foothold(self, leg: int, n: float) -> tuple[Array, str]:
-        """Centre (3,) m of a foot that swings in step ``n``: below where the body will be in the middle of its stance,
-        or near there; and why there is none."""
+    def _touches(self, step: Step, n: int, before: Array) -> tuple[_Failure | None, bool]:
+        """What comes too near to the ground, or to what, in a step after the body's pose ``before`` (6,) and, as far as
+        its foot stands there, in the steps after it; and whether a higher swing may help."""
+        shell = self.shell
+        if shell is None:
+            return None, False
+        leg, name = step.leg, self.legs.names[step.leg]
+        value, _, _ = blend(MOVE)
+        later = [self._later(step, n, k, share) for k in range(1, len(self.legs)) for share in (0.0, step.share, AHEAD)]
+        poses = np.concatenate(
+            [before + value[:, None] * (step.pose - before), np.tile(step.pose, (len(SWING), 1)), later]
+        )
+        feet = np.repeat(step.before[None], len(poses), axis=0)
+        feet[len(MOVE) : len(MOVE) + len(SWING), leg] = step.foot(SWING)[0]
+        feet[len(MOVE) + len(SWING) :] = step.after
+        base = base_of(poses)
+        q, placed = self.legs.place(seen_from(base, feet), self.guess)
+        frames = self.legs.robot.forward(q, base).array
+        spare = shell.gaps(self.ground, frames, self.needed) - self.needed
+        spare[~placed.all(axis=1)] = np.inf
+        first, last = len(MOVE), len(MOVE) + len(SWING)
+        mine = shell.owners == leg
+        when = f"while {name} swings at {step.lift_off:.4g} s"
+        row, part = np.unravel_index(int(spare[:last].argmin()), (last, spare.shape[1]))
+        short = -float(spare[row, part])
+        if short > EXACT:
+            if row < first:
+                when = f"at {step.begin + self.sway_time * float(MOVE[row]):.4g} s, before {name} swings"
+            what, wanted = shell.name(int(part)), float(self.needed[part])
+            reason = f"{what} comes within {wanted - short:.3g} m of the ground {when}, clearance wants {wanted:.3g} m"
+            raising = bool(mine[part] and first < row < last - 1)
+            elsewhere = bool(mine[part] and row > first)
+            return _Failure(Status.BELOW_FLOOR, reason, step.begin, short, elsewhere), raising
+        gap, _, names = shell.nearest_pair(frames[:last])
+        if gap < -EXACT:
+            reason = f"{names[0]} and {names[1]} would be in each other {when}"
+            return _Failure(Status.LINKS_CROSSING, reason, step.begin, -gap, True), False
+        # how this leg will stand, as far as that can be guessed
+        short = -float(spare[last:, mine].min(initial=np.inf))
+        if short > EXACT:
+            return _Failure(Status.BELOW_FLOOR, "", step.begin, short, True, step), False
+        return None, False
+
+    def _later(self, step: Step, n: int, k: int, share: float) -> Array:
+        """A guess of the body's pose (6,) ``k`` steps after step ``n``, with a ``share`` of sway."""
+        at, heading = self.course.at((n + k) * self.step_time)
+        swinging = self.order[(n + k) % len(self.legs)]
+        centroid = np.delete(step.after, swinging, axis=0)[:, :2].mean(axis=0)
+        return self.pose(at + share * (centroid - at), heading, step.after)
+
+    def _footholds(self, leg: int, n: float) -> tuple[Array, str]:
+        """Centres (k, 3) m, best first, of a foot that swings in step ``n``: below where the body will be in the middle
+        of its stance, or near there; and why there is none."""
         at, heading = self.course.at((n + 0.5 * len(self.legs)) * self.step_time)
         c, s = np.cos(heading), np.sin(heading)
         x, y = self.offsets[leg, :2]
         nominal = at + np.array([c * x - s * y, s * x + c * y])
-        return foothold(
+        return footholds(
             self.ground,
             nominal,
             self.legs.legs[leg].radius,
@@ -166,16 +273,17 @@ class Planner:
         )
 
     def _body(
-        self, leg: int, n: float, before: Array, after: Array, shape: tuple[float, float] = (0.0, 1.0)
+        self, leg: int, n: float, before: Array, after: Array, shape: tuple[float, float], rise: float = 0.0
     ) -> tuple[Array, float, float, BoolArray]:
-        """Pose (6,) of the body while ``leg`` swings in step ``n``, the least margin m, the share of the sway and
-        which feet (m,) are in reach."""
+        """Pose (6,) of the body, ``rise`` m higher than usual, while ``leg`` swings in step ``n``, the least margin m,
+        the share of the sway and which feet (m,) are in reach."""
         at, heading = self.course.at(n * self.step_time)
         others = [j for j in range(len(self.legs)) if j != leg]
         stance = before[others]
         centroid = stance[:, :2].mean(axis=0)
         shares = np.linspace(0.0, 1.0, SHARES) if self.gait.sway == "auto" else np.array([float(self.gait.sway)])
         poses = np.stack([self.pose(at + s * (centroid - at), heading, before) for s in shares])
+        poses[:, 2] += rise
         swung, _, _ = swing_path(before[leg], after[leg], *shape, PLACES)
         feet = np.repeat(before[None], len(PLACES), axis=0)
         feet[:, leg] = swung

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,10 +91,10 @@ def swing_path(start: Array, end: Array, lift: float, early: float, tau: Array) 
     return np.where((tau > 0.5)[:, None], end - landing, start + risen), velocity, acceleration
 
 
-def clear_swing(ground: Ground, start: Array, end: Array, lift: float, radius: float) -> tuple[float, float] | None:
-    """The least raised (lift, early) of a swing that takes a ball of ``radius`` m over the ground, or None.
+def clear_swings(ground: Ground, start: Array, end: Array, lift: float, radius: float) -> Iterator[tuple[float, float]]:
+    """(lift, early) of swings that take a ball of ``radius`` m over the ground, the least raised first.
 
-    It keeps off the ground by KEEP of its lift, but no farther than its ends have room at their sides."""
+    They keep off the ground by KEEP of ``lift``, but no farther than their ends have room at their sides."""
     tau = np.linspace(0.0, 1.0, PLACES)[1:-1]
     up = 2.0 * radius * np.array([0.0, 0.0, 1.0])
     try:
@@ -104,11 +105,15 @@ def clear_swing(ground: Ground, start: Array, end: Array, lift: float, radius: f
             for early in EARLY:
                 place, _, _ = swing_path(start, end, height, early, tau)
                 if np.all(ground.clearance(place) - radius >= wanted):
-                    return height, early
+                    yield height, early
             height *= RAISE
     except InputError:  # beyond the edge of the ground
-        return None
-    return None
+        return
+
+
+def clear_swing(ground: Ground, start: Array, end: Array, lift: float, radius: float) -> tuple[float, float] | None:
+    """The first of :func:`clear_swings`, or None."""
+    return next(clear_swings(ground, start, end, lift, radius), None)
 
 
 def _within(tau: Array, first: float, last: float) -> tuple[Array, Array, Array, Array]:
