@@ -52,6 +52,11 @@ FORMATS: dict[str, Format] = {
         Format("csv", ".csv", "csv_file", "table of the trajectory, names and units in the header"),
         Format("npz", ".npz", "npz_file", "everything; load gives an equal Motion"),
         Format("mjcf", ".xml", "mjcf", "model of robot and ground for MuJoCo", "physics"),
+        Format("mcap", ".mcap", "mcap_file", "log of ROS 2 joint states and frames, for Foxglove and RViz", "ros"),
+        Format("yaml", ".yaml", "joint_trajectory", "ROS 2 JointTrajectory, for a controller", aliases=(".yml",)),
+        Format("glb", ".glb", "gltf", "animated glTF of robot and ground, for Blender and browsers", "gltf"),
+        Format("header", ".h", "c_header", "C99 header of the sampled trajectory, for a microcontroller"),
+        Format("c", ".c", "c_model", "C99 source and header of the robot's kinematics", "symbolic"),
     )
 }
 
