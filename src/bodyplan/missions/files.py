@@ -315,7 +315,8 @@ def _line_of(text: str, place: Sequence[str | int]) -> int | None:
 
 
 def override(data: dict[str, Any], item: str, example: str = "gait.omega=1.2") -> None:
-    """Set a field of a table by a text such as ``example``; InputError where it is not one."""
+    """Set a field of a table by a text such as ``example``, or a place in a list by "gait.velocity.0=0.02"; InputError
+    where it is not one."""
     key, equals, value = item.partition("=")
     parts = [part.strip() for part in key.split(".")]
     if not equals or not all(parts):
@@ -327,7 +328,18 @@ def override(data: dict[str, Any], item: str, example: str = "gait.omega=1.2") -
         parsed = value.strip()  # a bare word or a quantity: 30 deg
     table: Any = data
     for part in parts[:-1]:
-        table = table.setdefault(part, {}) if isinstance(table, dict) else None
-        if not isinstance(table, dict):
+        if isinstance(table, list):
+            table = table[_place(table, part, item)]
+        else:
+            table = table.setdefault(part, {}) if isinstance(table, dict) else None
+        if not isinstance(table, dict | list):
             raise InputError(f"--set {item}: {part} is not a table.")
-    table[parts[-1]] = parsed
+    last: Any = parts[-1]
+    table[_place(table, last, item) if isinstance(table, list) else last] = parsed
+
+
+def _place(values: list[Any], part: str, item: str) -> int:
+    """The place in a list that a part of a key names, from 0."""
+    if not re.fullmatch(r"[0-9]{1,6}", part) or int(part) >= len(values):
+        raise InputError(f"--set {item}: {part!r} is no place in a list of {len(values)}: 0 to {len(values) - 1}.")
+    return int(part)
