@@ -10,12 +10,16 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.errors import BodyplanError
 from bodyplan.gaits.carry import Maps
+from bodyplan.motion import Motion
 from bodyplan.show.carrying import Carrying
 from bodyplan.show.carrying_plots import color
+from bodyplan.show.series import EXECUTED
 from bodyplan.spatial import apply
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from bodyplan.show.playback import Playback
 
 #: cells of the ground along its longer side
 CELLS = 160
@@ -33,14 +37,17 @@ STATES = {
 MOST_FRICTION = 1.0
 
 
-def wheels_above(found: Carrying | None, new_figure: Callable[[float], Figure]) -> Figure | None:
-    """From above: the ground, the body's path, where wheels touch, and the body at the beginning, middle and end."""
+def wheels_above(playback: Playback, new_figure: Callable[[float], Figure]) -> Figure | None:
+    """From above: the ground, the body's path, where wheels touch, and the body at the beginning, middle and end; its
+    path in physics."""
+    found = playback.carrying
     if found is None:
         return None
     motion = found.motion
+    made = None if playback.executed is None else playback.executed[:, 0]
     body = motion.base[found.chosen, :3]
     points = found.points
-    every = np.concatenate([points.reshape(-1, 3), body])
+    every = np.concatenate([points.reshape(-1, 3), body, *([] if made is None else [made[:, :3]])])
     every = every[np.isfinite(every).all(axis=1)]
     low, high = every.min(axis=0) - 0.15, every.max(axis=0) + 0.15
     span = high - low
@@ -51,8 +58,12 @@ def wheels_above(found: Carrying | None, new_figure: Callable[[float], Figure]) 
         ax.plot(points[:, k, 0], points[:, k, 1], color=color(k), linewidth=1.1, label=f"contact of {name}")
     ax.plot(body[:, 0], body[:, 1], color="#333333", linewidth=1.4, label="body")
     for i in np.unique([0, len(motion.t) // 2, len(motion.t) - 1]):
-        for corners in _outlines(found, int(i)):
+        for corners in _outlines(motion, motion.base[i]):
             ax.fill(*corners.T, facecolor="#33333318", edgecolor="#333333", linewidth=0.8)
+    if made is not None and len(made):
+        ax.plot(made[:, 0], made[:, 1], color=EXECUTED, linewidth=1.6, linestyle="--", label="body in physics")
+        for corners in _outlines(motion, made[-1]):
+            ax.fill(*corners.T, facecolor="none", edgecolor=EXECUTED, linewidth=1.0, linestyle="--")
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
@@ -62,10 +73,8 @@ def wheels_above(found: Carrying | None, new_figure: Callable[[float], Figure]) 
     return figure
 
 
-def _outlines(found: Carrying, sample: int) -> list[Array]:
-    """Corners (4, 2) m of the boxes of the hull, or of the wheels' centres, at one sample."""
-    motion = found.motion
-    pose = motion.base[sample]
+def _outlines(motion: Motion, pose: Array) -> list[Array]:
+    """Corners (4, 2) m of the boxes of the hull of a base at ``pose`` (7,)."""
     signs = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     boxes = [c for c in motion.robot.contacts if c.shape == "box" and c.frame == "base"]
     return [np.asarray(apply(pose, np.array(c.start) + signs * np.array(c.half))[:, :2]) for c in boxes]

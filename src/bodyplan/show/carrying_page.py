@@ -11,6 +11,8 @@ from bodyplan.show.carrying import Carrying
 from bodyplan.show.text import NOTHING, counted, degrees, esc, figure, picture, plot, section, table
 
 TITLE = "On its wheels"
+#: smaller values, in any unit of the table, are shown as 0
+ROUNDING = 1e-9
 
 
 def carrying_section(found: Carrying | None, pictures: Mapping[str, str], *, paper: bool) -> str:
@@ -109,7 +111,7 @@ def _table(found: Carrying) -> str:
 
 
 def _span(values: Array, unit: str) -> str:
-    some = values[np.isfinite(values)]
+    some = _settled(values)
     if not len(some):
         return NOTHING
     low, high = float(some.min()), float(some.max())
@@ -119,5 +121,11 @@ def _span(values: Array, unit: str) -> str:
 
 
 def _most(values: Array, unit: str) -> str:
-    some = np.abs(values[np.isfinite(values)])
+    some = np.abs(_settled(values))
     return figure(float(some.max()), unit, 3) if len(some) else NOTHING
+
+
+def _settled(values: Array) -> Array:
+    """Those that are known, without what is rounding."""
+    some = values[np.isfinite(values)]
+    return np.where(np.abs(some) < ROUNDING, 0.0, some)

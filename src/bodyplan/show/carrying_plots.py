@@ -16,6 +16,8 @@ Plot = dict[str, Any]
 #: colours of wheels and how their bands are filled
 BANDS = ("rgba(0,114,178,0.13)", "rgba(217,130,0,0.15)", "rgba(0,158,115,0.13)", "rgba(204,121,167,0.15)",
          "rgba(86,180,233,0.15)", "rgba(92,75,138,0.13)")  # fmt: skip
+#: m/s
+SLIPPING = 1e-6
 
 
 def carrying_plots(outcome: Outcome, found: Carrying | None) -> dict[str, Plot | None]:
@@ -29,10 +31,15 @@ def carrying_plots(outcome: Outcome, found: Carrying | None) -> dict[str, Plot |
         "wheel_torques": _torques(found) if turns and np.isfinite(found.torque).any() else None,
         "wheel_hubs": _lines(found, found.hub, "hub torque (N m)") if np.isfinite(found.hub).any() else None,
         "wheel_spins": _lines(found, found.spin, "spin (rad/s)"),
-        "wheel_slips": _lines(found, 1e3 * found.slip, "slip to the left (mm/s)"),
+        "wheel_slips": _lines(found, 1e3 * found.slip, "slip to the left (mm/s)") if _slips(found) else None,
         "wheel_friction": _friction(found) if np.isfinite(found.used).any() else None,
         "hull_clearance": _clearance(found),
     }
+
+
+def _slips(found: Carrying) -> bool:
+    """Whether any wheel is dragged sideways by more than rounding."""
+    return bool(np.nanmax(np.abs(found.slip), initial=0.0) > SLIPPING)
 
 
 def color(k: int) -> str:

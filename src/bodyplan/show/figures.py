@@ -55,7 +55,8 @@ def new_figure(height: float) -> Figure:
 def figures(outcome: Outcome, playback: Playback) -> dict[str, Figure]:
     """Every figure that this outcome gives, by name."""
     makers: dict[str, Callable[[Outcome, Playback], Figure | None]] = {
-        "body_keyframes": lambda o, p: body_keyframes(p, new_figure),
+        # plates would cover each other: a body on wheels has a figure of its own
+        "body_keyframes": lambda o, p: None if p.carrying else body_keyframes(p, new_figure),
         "joint_angles": joint_angles,
         "joint_rates": joint_rates,
         "advance": advance,
@@ -63,7 +64,7 @@ def figures(outcome: Outcome, playback: Playback) -> dict[str, Figure]:
         "torque": torque,
         "curve_and_mechanism": lambda o, p: following_figure(p.following, new_figure),
         "walk": lambda o, p: walk_figure(o.motion, new_figure),
-        "wheels_above": lambda o, p: wheels_above(p.carrying, new_figure),
+        "wheels_above": lambda o, p: wheels_above(p, new_figure),
         "wheels_maps": lambda o, p: wheels_maps(p.carrying, new_figure),
         "side_views": lambda o, p: side_views(p.inching, new_figure),
         "footholds": lambda o, p: footholds(p.inching, new_figure),

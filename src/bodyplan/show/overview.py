@@ -10,6 +10,7 @@ from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
 from bodyplan.show.remarks import plan_warnings
 from bodyplan.show.text import counted, esc, figure, listed, percent, plain, unit_of, words
+from bodyplan.simulate.wheels import turning_remarks
 
 #: failed checks that are told beside the verdict
 TOLD = 3
@@ -108,6 +109,8 @@ def _physics(outcome: Outcome) -> tuple[str, str]:
         return "Not executed in physics", "plain"
     if not trial.ok:
         return f"✗ Physics {esc(trial.status)}: {esc(trial.reason)}", "bad"
+    if turning_remarks(outcome.motion.robot, trial.yaw_ratio):
+        return f"Physics executed {percent(trial.yaw_ratio)} of the planned turn: it cannot turn", "bad"
     if trial.advance_ratio is None:
         return (
             f"Physics executed it, at a mean speed of {figure(trial.speed, 'm/s', 3)}; no advance is planned",
