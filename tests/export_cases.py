@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import bodyplan as bp
 from bodyplan.robot import Arc, Body, Contact, Joint, Row, WheelRadius
 from bodyplan.spatial.rotations import quaternion_exp
+from robot_cases import frame_matrices
 
 CASES = ("concertina", "serpentine arcs", "double joints", "inching", "crawl", "wheels", "everything")
 
@@ -104,3 +106,11 @@ def everything() -> bp.Motion:
     torques = np.cos(t[:, None] * (1.0 + phase))
     ground = bp.Corridor(3.0, height=1.5)
     return bp.Motion(robot, ground, {}, t, base, q, qd, qdd, np.zeros(len(t)), np.full(len(t), "ok"), torques=torques)
+
+
+def world_matrices(motion: bp.Motion, sample: int) -> dict[str, np.ndarray]:
+    """T (4, 4) of every frame in the world, from products of elementary matrices (:mod:`robot_cases`)."""
+    base = np.eye(4)
+    base[:3, 3] = motion.base[sample, :3]
+    base[:3, :3] = Rotation.from_quat(motion.base[sample, 3:], scalar_first=True).as_matrix()
+    return {name: base @ T.real for name, T in frame_matrices(motion.robot, motion.q[sample]).items()}
