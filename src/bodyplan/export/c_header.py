@@ -173,7 +173,7 @@ def text(track: Sampled, name: str, robot: str, dtype: str = "float", interpolat
         "N_SAMPLES": str(len(track.t)),
         "DURATION_S": number.one(track.t[-1]),
         "STEP_S": number.one(track.step or 0.0),
-        "JOINT_INDICES": indices(f"{word.upper()}_", identifiers((n.upper() for n in track.names), "J")),
+        "JOINT_INDICES": indices(f"{word.upper()}_Q_", identifiers((n.upper() for n in track.names), "J")),
         "JOINT_NAMES": ",\n".join(f"    {literal(joint)}" for joint in track.names),
         "TIME_VALUES": number.row(track.t),
         "VALUES": number.table(track.q),
