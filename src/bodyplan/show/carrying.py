@@ -134,12 +134,22 @@ def _ratio(force: Array, normal: Array) -> Array:
 def _twists(motion: Motion) -> Array:
     """Body-fixed twists (T, 6) of the base, by differences of the samples: good enough for a picture of slip."""
     t, base = motion.t, motion.base
-    before, after = np.maximum(np.arange(len(t)) - 1, 0), np.minimum(np.arange(len(t)) + 1, len(t) - 1)
-    span = (t[after] - t[before])[:, None]
-    back = conjugate(base[:, 3:])
-    velocity = rotate(back, base[after, :3] - base[before, :3]) / span
-    turned = multiply(conjugate(base[before, 3:]), base[after, 3:])
-    return np.concatenate([velocity, quaternion_log(turned) / span], axis=1)
+    middle, span = 0.5 * (t[1:] + t[:-1]), np.diff(t)[:, None]
+    moved = np.diff(base[:, :3], axis=0) / span
+    # between two samples the body turns about an axis that both see alike
+    turned = quaternion_log(multiply(conjugate(base[:-1, 3:]), base[1:, 3:])) / span
+    velocity, spin = (np.stack([_between(t, middle, v) for v in rates.T], axis=1) for rates in (moved, turned))
+    return np.concatenate([rotate(conjugate(base[:, 3:]), velocity), spin], axis=1)
+
+
+def _between(t: Array, middle: Array, values: Array) -> Array:
+    """Values at ``middle`` (T - 1,) at times t (T,): linear, also beyond the ends."""
+    out = np.interp(t, middle, values)
+    if len(middle) > 1:
+        for end, one, other in ((0, 0, 1), (-1, -1, -2)):
+            slope = (values[other] - values[one]) / (middle[other] - middle[one])
+            out[end] = values[one] + slope * (t[end] - middle[one])
+    return np.asarray(out)
 
 
 def _statics(motion: Motion, few: IntArray) -> tuple[Forces | None, str]:

@@ -47,7 +47,12 @@ def wheels_above(playback: Playback, new_figure: Callable[[float], Figure]) -> F
     made = None if playback.executed is None else playback.executed[:, 0]
     body = motion.base[found.chosen, :3]
     points = found.points
-    every = np.concatenate([points.reshape(-1, 3), body, *([] if made is None else [made[:, :3]])])
+    shown = [(pose, "planned") for pose in motion.base[np.unique([0, len(motion.t) // 2, len(motion.t) - 1])]]
+    if made is not None and len(made):
+        shown.append((made[-1], "made"))
+    plates = [(corners, kind) for pose, kind in shown for corners in _outlines(motion, pose)]
+    every = np.concatenate([points.reshape(-1, 3), body, *([] if made is None else [made[:, :3]])])[:, :2]
+    every = np.concatenate([every, *(corners for corners, _ in plates)])
     every = every[np.isfinite(every).all(axis=1)]
     low, high = every.min(axis=0) - 0.15, every.max(axis=0) + 0.15
     span = high - low
@@ -57,13 +62,13 @@ def wheels_above(playback: Playback, new_figure: Callable[[float], Figure]) -> F
     for k, name in enumerate(found.names):
         ax.plot(points[:, k, 0], points[:, k, 1], color=color(k), linewidth=1.1, label=f"contact of {name}")
     ax.plot(body[:, 0], body[:, 1], color="#333333", linewidth=1.4, label="body")
-    for i in np.unique([0, len(motion.t) // 2, len(motion.t) - 1]):
-        for corners in _outlines(motion, motion.base[i]):
+    for corners, kind in plates:
+        if kind == "planned":
             ax.fill(*corners.T, facecolor="#33333318", edgecolor="#333333", linewidth=0.8)
+        else:
+            ax.fill(*corners.T, facecolor="none", edgecolor=EXECUTED, linewidth=1.0, linestyle="--")
     if made is not None and len(made):
         ax.plot(made[:, 0], made[:, 1], color=EXECUTED, linewidth=1.6, linestyle="--", label="body in physics")
-        for corners in _outlines(motion, made[-1]):
-            ax.fill(*corners.T, facecolor="none", edgecolor=EXECUTED, linewidth=1.0, linestyle="--")
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])

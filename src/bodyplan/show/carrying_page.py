@@ -63,9 +63,9 @@ def _standing(found: Carrying) -> str:
     facts = found.motion.facts
     if "required_friction" in facts:
         need, given = facts["required_friction"], facts["friction"]
+        grip = f"with a friction of <b>{figure(need, digits=3)}</b> or more" if need > ROUNDING else "without friction"
         held = (
-            f"At rest the body is held with a friction of <b>{figure(need, digits=3)}</b> or more "
-            f"({figure(given, digits=3)} is given), and its centre of mass stays "
+            f"At rest the body is held {grip} ({figure(given, digits=3)} is given), and its centre of mass stays "
             f"<b>{figure(facts.get('support_margin'), 'm', 3)}</b> inside the polygon of its contacts."
         )
     elif found.motion.forces is None:
@@ -100,14 +100,15 @@ def _table(found: Carrying) -> str:
         "radius",
         "torque, (34)",
         "torque, (35)",
-        "hub torque, most",
+        "hub torque",
         "spin",
-        "sideways slip, most",
-        "friction / load, most",
+        "sideways slip",
+        "friction / load",
     )
     lost = int(np.sum(found.motion.status != "ok"))
     note = f"<p>Of {counted(len(found.motion.t) - lost, 'sample')} that were solved.</p>" if lost else ""
-    return table(head, rows, numbers=range(1, len(head))) + note
+    what = "<p>Smallest to largest; of hub torque, slip and friction the largest.</p>"
+    return table(head, rows, numbers=range(1, len(head))) + what + note
 
 
 def _span(values: Array, unit: str) -> str:
@@ -115,6 +116,7 @@ def _span(values: Array, unit: str) -> str:
     if not len(some):
         return NOTHING
     low, high = float(some.min()), float(some.max())
+    low = 0.0 if abs(low) < 1e-4 * abs(high) else low
     if high - low <= 5e-4 * max(abs(low), abs(high)):
         return figure(high, unit, 3)
     return f"{figure(low, digits=3)} to {figure(high, unit, 3)}"
