@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bodyplan.cli import doctor, exports, fits, lists, models, reports, runs, searches
+from bodyplan.cli import doctor, exports, fits, lists, models, reports, runs, searches, views
 
 app = typer.Typer(
     name="bodyplan",
@@ -25,6 +25,7 @@ app = typer.Typer(
 COMMANDS = (
     runs.run,
     runs.check,
+    views.view,
     reports.report,
     exports.export,
     fits.fit,
