@@ -69,7 +69,7 @@ def least(A: Array, b: Array, cones: Cones, square: float, gain: Array) -> Found
 def least_excess(A: Array, b: Array, kind: IntArray, aim: Array, cap: Array, weight: Array, bound: float) -> Slack:
     """The smallest slack with A x = b, |tangential_i| <= aim_i normal_i + slack weight_i, and <= cap_i normal_i.
 
-    Always has a solution, also where ``aim`` is out of reach; y then proves it. |x| <= bound, slack >= -1.
+    Always has a solution, also where ``aim`` is out of reach; y then proves it. |x| <= bound.
     """
     clarabel = library()
     k = len(kind)
@@ -99,9 +99,6 @@ def least_excess(A: Array, b: Array, kind: IntArray, aim: Array, cap: Array, wei
                 add(within, np.zeros(3), clarabel.SecondOrderConeT(3))
         if kind[i] in (CONE, RAY):
             add(-unit[:1], np.zeros(1), clarabel.NonnegativeConeT(1))
-    last = np.zeros((1, 3 * k + 1))
-    last[0, -1] = -1.0
-    add(last, np.ones(1), clarabel.NonnegativeConeT(1))
     size = np.concatenate([np.zeros((1, 3 * k + 1)), -np.eye(3 * k, 3 * k + 1)])
     add(size, np.concatenate([[bound], np.zeros(3 * k)]), clarabel.SecondOrderConeT(3 * k + 1))
     cost = np.zeros(3 * k + 1)

@@ -10,11 +10,15 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.solve.statics.cones import CONE, NOTHING, RAY, Cones, ratios
 from bodyplan.solve.statics.conic import least_excess
-from bodyplan.solve.statics.equilibrium import ROUNDING
+from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, balance
 from bodyplan.solve.statics.polish import PolishedRatio, polish_ratio
 
+#: forces up to this many times the load are looked at first
+MODERATE = 1e2
 #: forces beyond this many times the load: squeezing that the least friction needs without bound
 SQUEEZED = 1e5
+#: how near forces of that size come to the least friction
+NEAR = 1e-3
 #: coefficients beyond this are no friction
 MOST = 1e8
 #: residual of the conditions of optimality up to which a solution is one
@@ -51,15 +55,22 @@ class Family:
 
 
 class Factor(NamedTuple):
-    """The least factor ``s`` (inf: none does), forces ``x`` (k, 3) of it, ``y`` (r,) of length 1 that proves it (0:
-    none needed), ``attained``: False where s itself needs forces without bound and any more does not; ``exact``: if
-    the conditions of optimality hold to rounding."""
+    """The least factor ``s`` (inf: none does), forces ``x`` (k, 3) of it, ``y`` (r,) that proves it (0: none needed),
+    by the contacts ``kept`` (k,), the only ones that can carry something with this friction. ``attained``: False where
+    s itself needs forces without bound and any more does not; ``exact``: if the conditions of optimality hold to
+    rounding."""
 
     s: float
     x: Array
     y: Array
+    kept: BoolArray
     attained: bool = True
     exact: bool = True
+
+    @property
+    def usable(self) -> bool:
+        """Whether a similar item can start from here."""
+        return 0.0 < self.s < np.inf and self.attained and bool(self.kept.all())
 
 
 def holds_with_any_friction(A: Array, b: Array, free: BoolArray) -> bool:
@@ -77,6 +88,14 @@ def holds_with_any_friction(A: Array, b: Array, free: BoolArray) -> bool:
     return bool(left <= ROUNDING * max(1.0, float(np.linalg.norm(b))))
 
 
+def along_normals(A: Array, b: Array) -> Array | None:
+    """Normal forces (k,) that balance the load by themselves, or None."""
+    from scipy.optimize import nnls
+
+    normal, left = nnls(A[:, 0::3], b)
+    return np.asarray(normal) if left <= ROUNDING * max(1.0, float(np.linalg.norm(b))) else None
+
+
 def least_factor(A: Array, b: Array, family: Family, start: Factor | None = None) -> Factor:
     """The least s with forces in the cones of ``family`` that balance: A x = b.
 
@@ -84,70 +103,121 @@ def least_factor(A: Array, b: Array, family: Family, start: Factor | None = None
     of the last s by the least (Crouzeix, Ferland and Schaible 1985), each a second-order cone program, and Newton's
     method finishes. ``start``: the result for a similar item, tried first.
     """
-    from scipy.optimize import nnls
-
     k, r = len(family.slope), len(b)
     nothing = np.zeros(r)
-    normal, left = nnls(A[:, 0::3], b)
-    if left <= ROUNDING * max(1.0, float(np.linalg.norm(b))):
-        x = np.zeros((k, 3))
-        x[:, 0] = normal
-        return Factor(0.0, x, nothing)
+    normal = along_normals(A, b)
+    if normal is not None:
+        return Factor(0.0, normal[:, None] * np.array([1.0, 0.0, 0.0]), nothing, family.touching)
     if not holds_with_any_friction(A, b, family.kind == CONE):
-        return Factor(np.inf, np.zeros((k, 3)), nothing)
-    if start is not None and np.isfinite(start.s) and start.s > 0.0 and start.attained and len(start.y) == r:
+        return Factor(np.inf, np.zeros((k, 3)), nothing, family.touching)
+    if start is not None and start.usable and len(start.y) == r:
         done = polish_ratio(A, b, family.at, start.x, start.y, start.s)
         if _proved(A, family, done):
-            return Factor(done.s, done.x, done.y)
+            return Factor(done.s, done.x, done.y, family.touching)
     return _searched(A, b, family)
 
 
 def _searched(A: Array, b: Array, family: Family) -> Factor:
-    k = len(family.slope)
-    bound = SQUEEZED * max(1.0, float(np.linalg.norm(b)))
-    low, high, s = 0.0, np.inf, 1.0
-    best: tuple[Array, Array] | None = None
+    """With forces of moderate size, and only if these reach for more, with large ones."""
+    k, size = len(family.slope), max(1.0, float(np.linalg.norm(b)))
+    s, high = 1.0, np.inf
+    for bound in (MODERATE * size, SQUEEZED * size):
+        found = _descended(A, b, family, bound, s, high)
+        if found.exact:
+            return found
+        idle = _idle(A, family.at(found.s)[0], found) if np.isfinite(found.s) else np.zeros(k, dtype=bool)
+        if idle.any():
+            fewer = _without(A, b, family, idle)
+            if fewer.s <= found.s:
+                return fewer
+        s = high = found.s
+        if not np.isfinite(s):
+            s = 1.0
+    if not np.isfinite(found.s):
+        return Factor(np.inf, np.zeros((k, 3)), np.zeros(len(b)), family.touching)
+    if np.abs(found.x).max() > 0.1 * SQUEEZED * size:
+        return _squeezed(A, family, found)
+    return found
+
+
+def _descended(A: Array, b: Array, family: Family, bound: float, s: float, high: float) -> Factor:
+    """The least factor with forces up to ``bound``, from ``s`` on; at most ``high``."""
+    k, floor = len(family.slope), 0.0
     weight = np.ones(k)
+    best = np.zeros((k, 3)), np.zeros(len(b))
     for _ in range(60):
         found = least_excess(A, b, family.kind, s * family.slope, family.cap, weight, bound)
         x = found.x + (A.T @ (b - A @ found.x.ravel())).reshape(k, 3)
         reached = family.needs(np.where(np.abs(x) < 1e-9 * np.abs(x).max(initial=0.0), 0.0, x))
         if found.slack > 1e-9:
-            low = max(low, s)
+            floor = max(floor, s)
         else:
             # forces at rounding's distance from the cones of s
             reached = min(reached, s)
-        if reached < high:
-            high = reached
-        best = x, found.y
-        if np.isfinite(high) and (abs(found.slack) < 1e-6 or high - low <= 1e-6 * high):
-            done = polish_ratio(A, b, family.at, x, found.y, min(max(s, low), high))
-            if _proved(A, family, done) and low * (1.0 - 1e-5) <= done.s <= high * (1.0 + 1e-5):
-                return Factor(done.s, done.x, done.y)
-            if high - low <= 1e-9 * high or abs(found.slack) < 1e-9:
+        if reached <= high:
+            high, best = reached, (x, found.y)
+        if np.isfinite(high) and (abs(found.slack) < 1e-5 or high - floor <= 1e-5 * high):
+            done = polish_ratio(A, b, family.at, x, found.y, min(max(s, floor), high))
+            if _proved(A, family, done) and floor * (1.0 - 1e-4) <= done.s <= high * (1.0 + 1e-4):
+                return Factor(done.s, done.x, done.y, family.touching)
+            if high - floor <= 1e-10 * high or abs(found.slack) < 1e-10:
                 break
         if not np.isfinite(high):
             s *= 4.0
             if s > MOST:
-                return Factor(np.inf, np.zeros((k, 3)), np.zeros(len(b)))
+                break
         else:
             # the worst ratio of the last forces, unless that hardly moves
-            s = high if high < 0.9 * s or high - low < 0.1 * high else 0.5 * (low + high)
-            weight = np.clip(x[:, 0], 1e-3, 1.0)
-    assert best is not None
-    x, y = best
-    if np.abs(x).max() > 0.1 * bound:
-        return _squeezed(A, b, family, x, y, low, high)
-    return Factor(high, x, y / max(float(np.linalg.norm(y)), 1e-300), exact=False)
+            s = high if high < 0.9 * s or high - floor < 0.1 * high else 0.5 * (floor + high)
+            weight = np.clip(x[:, 0], 1e-3, np.inf)
+    y = best[1] / max(float(np.linalg.norm(best[1])), 1e-300)
+    return Factor(high, best[0], y, family.touching, exact=False)
 
 
-def _squeezed(A: Array, b: Array, family: Family, x: Array, y: Array, low: float, high: float) -> Factor:
-    """The factor from which on contacts can squeeze without bound: that of forces in balance with each other."""
-    size = float(np.abs(x).max())
-    done = polish_ratio(A, np.zeros(len(b)), family.at, x / size, y, high)
-    near = low * (1.0 - 1e-2) <= done.s <= high
-    exact = done.residual <= PROVED and bool(near) and float(np.abs(done.x).max()) > 0.1
-    return Factor(max(done.s, 0.0) if exact else high, np.zeros_like(x), done.y, attained=False, exact=exact)
+def _idle(A: Array, cones: Cones, found: Factor) -> BoolArray:
+    """Contacts that cannot carry anything with this friction or less: all of A^T y points against forces in the cones,
+    of theirs strictly, and yet the work of the load is none."""
+    z = (A.T @ found.y).reshape(-1, 3)
+    size = max(float(np.linalg.norm(z, axis=1).max()), 1e-300)
+    along = (z[:, 0] + cones.mu * np.hypot(z[:, 1], z[:, 2])) / size
+    against = bool(np.all(along[cones.kind != NOTHING] < 1e-7))
+    none = np.linalg.norm(found.x, axis=1) < 1e-7 * np.abs(found.x).max()
+    return np.asarray((cones.kind != NOTHING) & (along < -1e-4) & none & against)
+
+
+def _without(A: Array, b: Array, family: Family, idle: BoolArray) -> Factor:
+    """The least factor of the other contacts."""
+    kept = family.touching & ~idle
+    rest = np.where(np.repeat(kept, 3), A, 0.0)
+    held = balance(rest, -b)
+    if held.left > ROUNDING * max(1.0, float(np.linalg.norm(b))):
+        return Factor(np.inf, np.zeros((len(kept), 3)), np.zeros(len(b)), kept)
+    found = least_factor(held.A, held.b, Family(family.slope, family.cap, kept))
+    return found._replace(y=_multipliers(rest, held.A.T @ found.y))
+
+
+def _multipliers(A: Array, push: Array) -> Array:
+    """y with A^T y = push."""
+    return np.asarray(np.linalg.lstsq(A.T, push, rcond=RANK)[0], dtype=np.float64)
+
+
+def _squeezed(A: Array, family: Family, found: Factor) -> Factor:
+    """The factor from which on contacts can squeeze without bound: that of forces in balance with each other, here with
+    normal forces that add up to the number of contacts."""
+    k = len(family.slope)
+    held = balance(np.vstack([A, np.tile([1.0, 0.0, 0.0], k)]), np.append(np.zeros(len(A)), -float(k)))
+    none = np.zeros_like(found.x)
+    if along_normals(held.A, held.b) is not None and found.s < 1e-2:
+        return Factor(0.0, none, found.y, found.kept, attained=False)
+    x = found.x * k / found.x[:, 0].sum()
+    y = _multipliers(held.A, A.T @ found.y)
+    done = polish_ratio(held.A, held.b, family.at, x, y, found.s)
+    s, exact = done.s, _proved(held.A, family, done)
+    if not exact or abs(s - found.s) > NEAR * (1.0 + found.s):
+        stress = _descended(held.A, held.b, family, MODERATE * k, found.s, np.inf)
+        s, exact = stress.s, stress.exact
+    exact = exact and abs(s - found.s) <= NEAR * (1.0 + found.s)
+    return Factor(s if exact else found.s, none, found.y, found.kept, False, exact)
 
 
 def _proved(A: Array, family: Family, done: PolishedRatio) -> bool:

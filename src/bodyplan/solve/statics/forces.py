@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status, UnknownNameError
 from bodyplan.solve.statics.cones import CONE, RAY, Cones, ratios
-from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, balance, friction
+from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, balance, friction
 from bodyplan.solve.statics.factor import Factor, Family, least_factor
-from bodyplan.solve.statics.item import Solved, at_least_factor, solve_item
+from bodyplan.solve.statics.item import SHORT, Solved, at_least_factor, solve_item
 from bodyplan.solve.statics.outcome import Outcome, shaped
 
 OBJECTIVES = ("min_norm", "min_ratio")
@@ -86,15 +86,13 @@ def contact_forces(
             continue
         held, on = balance(equations[i], loads.load[i]), loads.touching[i]
         if objective == "min_ratio" and held.left <= ROUNDING:
-            family = Family(np.ones(k), flat[i], on)
-            found = least_factor(held.A, held.b, family, last)
-            solved, last = _least_ratio(held, family, found, flat[i]), found
+            solved, last = _least_ratio(held, flat[i], on, last)
         else:
             solved = solve_item(held, flat[i], on, start)
             start = solved.y if solved.status is Status.OK else None
-        x[i] = solved.x
-        status[i], reasons[i] = solved.status.value, solved.reason
-        needed[i] = np.nan if solved.status is Status.OK else solved.needed
+        x[i], status[i], reasons[i] = solved.x, solved.status.value, solved.reason
+        if solved.status is not Status.OK:
+            needed[i] = solved.needed
     ratio = np.where(loads.touching, ratios(x), 0.0)
     ratio[status != Status.OK.value] = np.nan
     return ContactForces(
@@ -116,21 +114,27 @@ def smallest_free(loads: Loads, mu: Array) -> Array:
     ray = np.broadcast_to([1.0, 0.0, 0.0], x.shape)
     inside = Cones(kind, mu, ray).outside(x).max(axis=1) <= 1e-14 * np.abs(x).max(axis=(1, 2))
     inside &= loads.left_over(x) <= ROUNDING
+    x[~loads.touching] = 0.0
     x[~inside] = np.nan
     x[loads.force == 0.0] = 0.0
     return np.asarray(x)
 
 
-def _least_ratio(held: Any, family: Family, found: Factor, mu: Array) -> Solved:
-    if np.isfinite(found.s) and found.s <= mu[family.touching].max() * (1.0 + 1e-11):
-        if not found.attained:
-            none = np.full((len(mu), 3), np.nan)
-            why = f"the worst ratio has no smallest value: it tends to {found.s:.4g} as forces grow without bound"
-            return Solved(Status.NOT_CONVERGED, none, family.at(found.s)[0], held, found.y, found.s, why)
-        solved = at_least_factor(held, family, found)
+def _least_ratio(held: Balance, mu: Array, touching: BoolArray, last: Factor | None) -> tuple[Solved, Factor]:
+    """The forces of the least worst ratio and of these the smallest; the factor is a start for the next item."""
+    alike = bool(np.all(mu[touching] == mu[touching][0]))
+    family = Family(np.ones(len(mu)), np.full(len(mu), np.inf) if alike else mu, touching)
+    found = least_factor(held.A, held.b, family, last)
+    if not found.s <= mu[touching].max() * (1.0 + SHORT):
+        return solve_item(held, mu, touching), found
+    none, why = np.full((len(mu), 3), np.nan), "the forces of the least ratio could not be proved the smallest"
+    if found.attained:
+        solved = at_least_factor(held, family, found) if found.exact else None
         if solved is not None:
-            return solved
-    return solve_item(held, mu, family.touching)
+            return solved, found
+    else:
+        why = f"the worst ratio has no smallest value: it tends to {found.s:.4g} as forces grow without bound"
+    return Solved(Status.NOT_CONVERGED, none, Cones.of(mu, touching), held, found.y, found.s, why), found
 
 
 def _count(points: ArrayLike) -> int:

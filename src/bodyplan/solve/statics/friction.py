@@ -62,7 +62,7 @@ def required_friction(
             continue
         held = balance(equations[i], loads.load[i])
         family = Family(np.ones(k), np.full(k, np.inf), loads.touching[i])
-        found = Factor(np.inf, np.full((k, 3), np.nan), np.zeros(len(held.b)))
+        found = Factor(np.inf, np.full((k, 3), np.nan), np.zeros(len(held.b)), loads.touching[i])
         if held.left <= ROUNDING:
             last = found = least_factor(held.A, held.b, family, last)
         mu[i], attained[i], x[i] = found.s, found.attained, np.nan

@@ -14,8 +14,14 @@ from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, balance
 from bodyplan.solve.statics.factor import PROVED, Factor, Family, faces, holds_with_any_friction, least_factor
 from bodyplan.solve.statics.polish import polish
 
-#: share by which friction may be short of what is needed
-SHORT = 1e-11
+#: share by which friction may be short of what is needed, or more than it
+SHORT = 1e-12
+#: share of more friction with which forces cannot be told from those with what is needed
+JUST = 1e-9
+#: size of multipliers, beside that of forces, from which on friction may be just enough
+STEEP = 300.0
+#: what equations on faces of cones may leave of the load
+CONSISTENT = 1e-9
 
 
 class Solved(NamedTuple):
@@ -68,31 +74,41 @@ def solve_item(held: Balance, mu: Array, touching: BoolArray, start: Array | Non
         why = "the contacts cannot hold it whatever they do" if touching.any() else "nothing touches"
         return Solved(Status.TIPS_OVER, none, cones, held, nothing, np.inf, f"{why}, pushing or pulling")
     found = smallest(held, cones, start)
-    if found is not None:
+    # multipliers grow without bound where friction is just enough, and forces are then hard to tell from each other
+    if found is not None and np.linalg.norm(found[1]) < STEEP * max(1.0, float(np.linalg.norm(found[0]))):
         return Solved(Status.OK, found[0], cones, held, found[1])
     common = least_factor(A, b, Family(np.ones(k), np.full(k, np.inf), touching))
-    alike = bool(np.all(mu[touching] == mu[touching][0]))
-    if alike:
-        family, least_of = Family(np.ones(k), np.full(k, np.inf), touching), common
-        within = common.s <= mu[touching][0] * (1.0 + SHORT)
+    on = mu[touching]
+    if np.all(on == on[0]):
+        family, factor = Family(np.ones(k), np.full(k, np.inf), touching), common
+        share = on[0] / common.s if common.s > 0.0 else np.inf if on[0] > 0.0 else 1.0
     else:
         family = Family(mu, np.full(k, np.inf), touching)
-        least_of = least_factor(A, b, family)
-        within = least_of.s <= 1.0 + SHORT
-    if not within or not least_of.attained:
-        return _failed(held, cones, common, mu[touching])
-    at_least = at_least_factor(held, family, least_of)
-    return at_least if at_least is not None else Solved(
-        Status.NOT_CONVERGED, none, cones, held, nothing, common.s, "the forces could not be proved the smallest"
-    )  # fmt: skip
+        factor = least_factor(A, b, family)
+        share = 1.0 / factor.s if factor.s > 0.0 else np.inf
+    if share < 1.0 - SHORT or (share <= 1.0 + SHORT and not factor.attained):
+        return _failed(held, cones, common, on)
+    just = at_least_factor(held, family, factor) if share <= 1.0 + (SHORT if found is not None else JUST) else None
+    if just is not None:
+        return just
+    if found is not None:
+        return Solved(Status.OK, found[0], cones, held, found[1])
+    # contacts that can carry nothing are in the way of a proof
+    narrow = Cones.of(mu, factor.kept)
+    equations = on_faces(A, b, narrow)
+    best = smallest(equations, narrow) if equations.left <= CONSISTENT else None
+    if best is not None:
+        return Solved(Status.OK, best[0], narrow, equations, best[1])
+    why = "the smallest forces could not be proved to be so"
+    return Solved(Status.NOT_CONVERGED, none, cones, held, nothing, common.s, why)
 
 
 def at_least_factor(held: Balance, family: Family, found: Factor) -> Solved | None:
     """The smallest forces with the least factor of friction; None where they cannot be proved so."""
-    cones, _ = family.at(found.s)
-    narrow = faces(held.A, cones, found.y) if found.s > 0.0 else Cones.of(np.zeros(len(cones.mu)), family.touching)
+    cones, _ = Family(family.slope, family.cap, found.kept).at(found.s)
+    narrow = faces(held.A, cones, found.y) if found.s > 0.0 else Cones.of(np.zeros(len(cones.mu)), found.kept)
     equations = on_faces(held.A, held.b, narrow)
-    best = smallest(equations, narrow) if equations.left <= 1e-9 else None
+    best = smallest(equations, narrow) if equations.left <= CONSISTENT else None
     if best is None:
         return None
     return Solved(Status.OK, best[0], narrow, equations, best[1], found.s)

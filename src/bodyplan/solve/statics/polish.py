@@ -10,9 +10,9 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.solve.statics.cones import Cones
 
-#: residual of the conditions, beside the size of the forces, that is rounding
-EXACT = 1e-13
 STEPS = 40
+#: forces and multipliers beyond this are those of a solver that went astray
+ENDLESS = 1e12
 
 
 class Polished(NamedTuple):
@@ -24,7 +24,7 @@ class Polished(NamedTuple):
 
 
 class PolishedRatio(NamedTuple):
-    """As :class:`Polished`, with the factor ``s`` of the cones."""
+    """As :class:`Polished`, with the factor ``s`` of the cones; ``residual`` is that of forces over the load."""
 
     x: Array
     y: Array
@@ -83,31 +83,37 @@ def polish_ratio(
     u, residual = _newton(system, np.concatenate([x.ravel(), y / (length if length > 0.0 else 1.0), [s]]))
     near = system(u)[2]
     missed = float(np.abs(A @ near.ravel() - b).max(initial=0.0))
-    scale = max(1.0, float(np.abs(near).max(initial=0.0)))
-    return PolishedRatio(near, u[size:-1], float(u[-1]), max(residual, missed) / scale)
+    return PolishedRatio(near, u[size:-1], float(u[-1]), max(residual, missed))
 
 
 def _newton(system: Callable[[Array], tuple[Array, Array, Array]], u: Array) -> tuple[Array, float]:
-    """(u, largest residual): the best that steps of least squares get to, also where solutions are no single points."""
+    """(u, largest residual): the best that Newton's method gets to. Where solutions are not single points directions
+    in which nearly nothing changes are held back, by as much as serves best (Levenberg 1944, Marquardt 1963)."""
+    if not np.abs(u).max(initial=0.0) < ENDLESS:
+        return u, np.inf
     rest, jacobian, _ = system(u)
-    best = float(np.abs(rest).max(initial=0.0))
+    best = float(np.linalg.norm(rest))
     for _ in range(STEPS):
-        if best <= 1e-16 or not np.isfinite(best):
+        if best <= 1e-16 or not np.all(np.isfinite(jacobian)):
             break
-        step = np.linalg.lstsq(jacobian, -rest, rcond=1e-13)[0]
-        share, found = 1.0, False
-        while share > 1e-3:
-            after = u + share * step
+        U, s, V = np.linalg.svd(jacobian)
+        turned = U.T @ -rest
+        before = best
+        for damping in (0.0, best, best**0.5, best**0.25):
+            safe = np.where(s > 1e-13 * s[0], s, np.inf) if damping == 0.0 else s + damping**2 / np.maximum(s, 1e-300)
+            after = u + V.T @ (turned / safe)
+            if not np.abs(after).max(initial=0.0) < ENDLESS:
+                continue
             new_rest, new_jacobian, _ = system(after)
-            new = float(np.abs(new_rest).max(initial=0.0))
+            new = float(np.linalg.norm(new_rest))
             if new < best:
-                found = True
+                next_u, rest, jacobian, best = after, new_rest, new_jacobian, new
+            if best < 0.1 * before:
                 break
-            share *= 0.5
-        if not found:
+        if not best < before:
             break
-        u, rest, jacobian, best = after, new_rest, new_jacobian, new
-    return u, best
+        u = next_u
+    return u, float(np.abs(rest).max(initial=0.0))
 
 
 def _blocks(D: Array) -> Array:
