@@ -15,8 +15,8 @@ from bodyplan.show.text import esc
 
 def document(title: str, content: Iterable[str], data: Mapping[str, Any], scripts: Sequence[str]) -> str:
     """The whole HTML file. ``content``: HTML; ``data``: JSON types by the id of the element that will hold them;
-    ``scripts``: names of the page's own scripts in the order in which they run."""
-    texts = [WATCH, _plotly(), *(_resource(f"{name}.js") for name in scripts)]
+    ``scripts``: names of the page's own scripts in the order in which they run; without any, plotly is left out."""
+    texts = [WATCH, *([_plotly()] if scripts else []), *(_resource(f"{name}.js") for name in scripts)]
     return "\n".join(
         [
             "<!doctype html>",
