@@ -31,6 +31,8 @@ from bodyplan.spatial.rotations import left_jacobian, multiply, quaternion_exp, 
 Y_UP = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)
 #: stiff pieces that an arc is drawn with
 PIECES = 8
+#: ground around the robot's way, of the size of both
+MARGIN = 0.2
 #: most samples along a side of a height field
 MOST_SIDE = 200
 #: red, green, blue (linear), opacity
@@ -168,10 +170,11 @@ class _Scene:
 
     def _ground(self, ground: Ground) -> None:
         low, high = extent([self.poses], self.robot)
+        margin = MARGIN * float(np.linalg.norm(high - low)) * np.array([1.0, 1.0, 0.0])
+        low, high = low - margin, high + margin
         found = scenery(ground, low, high)
         # scenery's fields are for small pictures
-        margin = 0.2 * float(np.linalg.norm(high - low)) * np.array([1.0, 1.0, 0.0])
-        fields = [s for s in ground.solids(low - margin, high + margin) if s.kind == "field"]
+        fields = [solid for solid in ground.solids(low, high) if solid.kind == "field"]
         parts: dict[str, list[meshes.Mesh]] = {}
         for corners in found.planes:
             up = np.cross(corners[1] - corners[0], corners[2] - corners[0])
