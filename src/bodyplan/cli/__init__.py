@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bodyplan.cli import doctor, exports, fits, lists, models, reports, runs, searches, views
+from bodyplan.cli import doctor, exports, fits, lists, models, papers, reports, runs, searches, views
 
 app = typer.Typer(
     name="bodyplan",
@@ -32,6 +32,7 @@ COMMANDS = (
     lists.missions,
     lists.robots,
     models.model,
+    papers.papers,
     searches.sweep,
     searches.optimise,
     doctor.doctor,

@@ -124,8 +124,8 @@ def _head(results: Results) -> str:
     about = (
         "Every number, table, figure and equation that can be computed is computed by bodyplan and set beside what is "
         "printed. Numbers decide: <b>reproduced</b> means equal to the last printed digit, or an equation that agrees "
-        "with a third way of computing; <b>corrected</b> means that what is printed misses and ours does not, with what is "
-        "right; <b>not reproducible</b> means that hardware, missing data or a contradiction stands in the way."
+        "with a third way of computing; <b>corrected</b> means that what is printed misses and ours does not, with what "
+        "is right; <b>not reproducible</b> means that hardware, missing data or a contradiction stands in the way."
     )
     notes = {
         Verdict.REPRODUCED: "to the digits printed",
