@@ -13,7 +13,10 @@ from bodyplan.terminal import bad_input, print_table, say
 
 def model(
     robot: Annotated[
-        str, typer.Argument(help="A robot's .csv (extended D-H table) or .toml, or a name (see: bodyplan robots).")
+        str,
+        typer.Argument(
+            help="A robot's .csv (extended D-H table), .toml, .urdf or .xml (MJCF), or a name (see: bodyplan robots)."
+        ),
     ],
     symbolic: Annotated[
         bool, typer.Option("--symbolic", help="Write the formulas: NAME.tex (LaTeX) and NAME.py (NumPy).")

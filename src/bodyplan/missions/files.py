@@ -23,7 +23,8 @@ from bodyplan.robot.model import Robot
 from bodyplan.show.beside import check_row
 
 MAX_BYTES = 1_000_000
-_PATHS = {("robot", "path"), ("ground", "path")}
+#: options that name a file; a relative one is seen from the mission's folder
+_PATHS = {("robot", "path"), ("robot", "file"), ("ground", "path")}
 
 
 @dataclass(frozen=True)
@@ -134,9 +135,9 @@ def _build(source: _Source, model: MissionModel, section: str, data: dict[str, A
     builder, units = registry[kind]
     options = source.validate(options_model(kind, builder, units), table, (section,))
     given = {key: getattr(options, key) for key in options.model_fields_set}
-    if (section, "path") in _PATHS and isinstance(given.get("path"), str) and folder is not None:
-        given["path"] = str((folder / given["path"]).resolve())
-        data[section]["path"] = given["path"]
+    for name in ("path", "file"):
+        if (section, name) in _PATHS and isinstance(given.get(name), str) and folder is not None:
+            given[name] = data[section][name] = str((folder / given[name]).resolve())
     try:
         return builder(**given)
     except InputError as error:
@@ -220,7 +221,7 @@ def alone(text: str, name: str, overrides: Sequence[str] = ()) -> Mission:
 
 def _effective(text: str, data: Mapping[str, Any], folder: Path | None, overrides: Sequence[str]) -> str:
     """The mission as it runs: its own text, or written anew where overrides or relative paths changed it."""
-    if not overrides and not any("path" in data.get(section, {}) for section in SECTIONS):
+    if not overrides and not any(name in data.get(section, {}) for section, name in _PATHS):
         return text
     return _written(data, [f"# with --set {item}" for item in overrides])
 

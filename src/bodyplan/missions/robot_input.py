@@ -1,4 +1,4 @@
-"""A robot as a user names it: a ready one with options, a CSV table, or a TOML file."""
+"""A robot as a user names it: a ready one with options, a CSV table, a TOML file, URDF or MJCF."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from bodyplan.missions.schema import ROBOTS, options_model
 from bodyplan.robot.model import Robot
 
 #: kinds that are files, not robots
-FILES = ("file", "table")
+FILES = ("file", "table", "urdf", "mjcf")
+#: suffix -> who reads it
+READERS = {".csv": Robot.from_table, ".toml": Robot.from_toml, ".urdf": Robot.from_urdf, ".xml": Robot.from_mjcf}
 EXAMPLE = "mass=20 kg"
 
 
 def load_robot(source: str, overrides: Sequence[str] = ()) -> Robot:
     """The ready robot of that name with the options in ``overrides`` (texts "mass=20 kg"), or the robot in a .csv table
-    of extended D-H parameters or in a .toml file.
+    of extended D-H parameters, in a .toml file, in URDF (.urdf) or in MJCF (.xml).
 
     Raises InputError or UnknownNameError that names what is wrong and what there is.
     """
@@ -30,13 +32,14 @@ def load_robot(source: str, overrides: Sequence[str] = ()) -> Robot:
         return _ready(kind, overrides)
     path = Path(source)
     suffix = path.suffix.lower()
-    if suffix not in (".csv", ".toml"):
-        raise UnknownNameError("robot", source, ready, where="neither a known name nor a file ending in .csv or .toml")
+    if suffix not in READERS:
+        endings = ", ".join(READERS)
+        raise UnknownNameError("robot", source, ready, where=f"neither a known name nor a file ending in {endings}")
     if not path.is_file():
         raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}.")
     if overrides:
         raise InputError(f"--set {overrides[0]}: a robot from a file has no options; change the file.")
-    return Robot.from_table(path) if suffix == ".csv" else Robot.from_toml(path)
+    return READERS[suffix](path)
 
 
 def _ready(kind: str, overrides: Sequence[str]) -> Robot:

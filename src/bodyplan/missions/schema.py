@@ -77,6 +77,16 @@ def _robot_table(path: str) -> Robot:
     return Robot.from_table(path)
 
 
+def _robot_urdf(file: str, mimic: bool = True) -> Robot:
+    """A robot from a URDF file."""
+    return Robot.from_urdf(file, mimic=mimic)
+
+
+def _robot_mjcf(file: str, root: str | None = None) -> Robot:
+    """A robot from an MJCF file, read by MuJoCo."""
+    return Robot.from_mjcf(file, root=root)
+
+
 #: kind -> (builder, units of its options)
 ROBOTS: dict[str, tuple[Builder, Mapping[str, str]]] = {
     "snake": (snake, _SNAKE_UNITS),
@@ -88,6 +98,8 @@ ROBOTS: dict[str, tuple[Builder, Mapping[str, str]]] = {
     "rover": (rover, _WHEEL_UNITS),
     "file": (_robot_file, {}),
     "table": (_robot_table, {}),
+    "urdf": (_robot_urdf, {}),
+    "mjcf": (_robot_mjcf, {}),
 }
 GAITS: dict[str, tuple[Builder, Mapping[str, str]]] = {kind: (cls, cls.UNITS) for kind, cls in gaits.KINDS.items()}
 GROUNDS: dict[str, tuple[Builder, Mapping[str, str]]] = {

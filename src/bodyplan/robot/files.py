@@ -29,7 +29,7 @@ _YES_NO = {"": False, "no": False, "false": False, "0": False, "yes": True, "tru
 def read_toml(path: str | os.PathLike[str]) -> Parts:
     """Arguments of Robot from a TOML file with the fields of :meth:`Robot.to_dict`; numbers may be texts with
     units and variables may be drives as text. InputError names the file and the entry or line."""
-    text = _read(path)
+    text = read_text(path)
     with located(str(path)):
         try:
             return robot_from_dict(tomllib.loads(text))
@@ -171,7 +171,7 @@ def _header(cells: list[str], where: str) -> dict[str, str | None]:
 
 
 def _csv_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader(_read(path).splitlines(), strict=True)
+    reader = csv.reader(read_text(path).splitlines(), strict=True)
     try:
         for cells in reader:
             cells = [cell.strip() for cell in cells]
@@ -181,7 +181,7 @@ def _csv_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, list[str]]]:
         raise InputError(f"{path}, line {reader.line_num}: {error}.") from error
 
 
-def _read(path: str | os.PathLike[str]) -> str:
+def read_text(path: str | os.PathLike[str]) -> str:
     file = Path(path)
     try:
         if file.exists() and not file.is_file():

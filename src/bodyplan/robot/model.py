@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -318,6 +319,41 @@ class Robot:
             return cls(name, chains, tuple(contacts))
 
     from_csv = from_table
+
+    @classmethod
+    def from_urdf(
+        cls, path: str | os.PathLike[str], *, mimic: bool = True, contacts: Sequence[Contact] | None = None
+    ) -> Robot:
+        """The robot in a URDF file: fixed, revolute, continuous and prismatic joints, mimics, limits, masses.
+
+        Every link is a frame of the same name, in the same place; the root link is the base (a link that is called
+        "base" or "world" without being the root, "base.link", and slashes in names are dots). A fixed transform
+        becomes constant rows. Collision shapes (spheres, boxes, capsules, cylinders) become contacts, unless
+        ``contacts`` are given; meshes are ignored. An effort or a velocity of 0 and a range of no width count as
+        unknown. ``mimic`` False: joints that mimic others are joints of their own. InputError names the file and the
+        link or joint."""
+        from bodyplan.robot.reading.urdf import read_urdf
+
+        return cls(*read_urdf(path, mimic, contacts))
+
+    @classmethod
+    def from_mjcf(
+        cls, path: str | os.PathLike[str], *, root: str | None = None, contacts: Sequence[Contact] | None = None
+    ) -> Robot:
+        """The robot in an MJCF file, as MuJoCo (extra "physics") compiles it: hinges, slides, masses, limits, and
+        joints and fixed tendons that equality constraints couple by a straight line.
+
+        Every body is a frame of the same name, in the same place, and joint coordinates are MuJoCo's. A body with a
+        free joint is the base; without one the base is the world. ``root`` names the body on the world that is the
+        robot where there are several. Joints without an actuator are passive if any has one. ``contacts`` as in
+        :meth:`from_urdf`, else the primitive geoms that can touch. InputError for ball joints and closed loops."""
+        from bodyplan.robot.reading.mjcf import read_mjcf
+
+        return cls(*read_mjcf(path, root, contacts))
+
+    def to_urdf(self, path: str | os.PathLike[str]) -> None:
+        """Write the robot as URDF (:func:`bodyplan.export.urdf.write`)."""
+        import_module("bodyplan.export.urdf").write(self, path)
 
     def __reduce__(self) -> Any:
         return type(self), (self.name, self.chains, self.contacts, self.base_body)

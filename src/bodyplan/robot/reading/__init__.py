@@ -1,0 +1,1 @@
+"""Robots from the files of others: URDF and MJCF, as trees of links and then as chains of D-H rows."""
