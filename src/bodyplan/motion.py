@@ -172,9 +172,12 @@ class Motion:
         """Poses of every frame at every sample: ``robot.forward(q, base)``."""
         return self.robot.forward(self.q, self.base)
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the motion in the format of the path's suffix (``bodyplan.export.FORMATS``) and return the path."""
-        saved: Path = import_module("bodyplan.export").save(self, path)
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the motion in the format of the path's suffix and return the path: ``.npz`` (everything), ``.csv``,
+        ``.yaml`` (ROS 2 JointTrajectory), ``.mcap`` (ROS 2 log), ``.glb`` (animated 3D scene), ``.xml`` (MJCF),
+        ``.h`` (C99 trajectory), ``.c`` (C99 kinematics), ...: all of ``bodyplan.export.FORMATS``, with the ``options``
+        of its writer. Errors as of :func:`bodyplan.save`."""
+        saved: Path = import_module("bodyplan.export").save(self, path, **options)
         return saved
 
     @classmethod

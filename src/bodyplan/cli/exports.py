@@ -48,7 +48,7 @@ def export(
 
         form = format_named(to)
         suffixes = (form.suffix, *form.aliases)
-        target = out if out is not None else Path(Path(mission).resolve().stem + form.suffix)
+        target = out if out is not None else Path(Path(mission).resolve().stem + form.ending)
         if target.suffix.lower() not in suffixes:
             raise InputError(f"--out {target}: does not end in {' or '.join(suffixes)}.")
         options = {}

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 class Format:
     """A file format. ``name``: what a user asks for; ``suffix``: how its files end; ``module``: the one in
     ``bodyplan.export`` with ``write(motion, path, **options)``; ``about``: what it is, in a line; ``extra``: the
-    extra that its libraries come with; ``aliases``: other suffixes of the same."""
+    extra that its libraries come with; ``aliases``: other suffixes of the same; ``infix``: put before the suffix where
+    the file's name is not given, so that two files of one motion do not clash."""
 
     name: str
     suffix: str
@@ -31,6 +32,12 @@ class Format:
     about: str
     extra: str | None = None
     aliases: tuple[str, ...] = ()
+    infix: str = ""
+
+    @property
+    def ending(self) -> str:
+        """How a file is called whose name is not given, after the name of its motion."""
+        return self.infix + self.suffix
 
     @property
     def writer(self) -> Callable[..., Any]:
@@ -55,7 +62,13 @@ FORMATS: dict[str, Format] = {
         Format("mcap", ".mcap", "mcap_file", "log of ROS 2 joint states and frames, for Foxglove and RViz", "ros"),
         Format("yaml", ".yaml", "joint_trajectory", "ROS 2 JointTrajectory, for a controller", aliases=(".yml",)),
         Format("glb", ".glb", "gltf", "animated glTF of robot and ground, for Blender and browsers", "gltf"),
-        Format("header", ".h", "c_header", "C99 header of the sampled trajectory, for a microcontroller"),
+        Format(
+            "header",
+            ".h",
+            "c_header",
+            "C99 header of the sampled trajectory, for a microcontroller",
+            infix="_trajectory",
+        ),
         Format("c", ".c", "c_model", "C99 source and header of the robot's kinematics", "symbolic"),
     )
 }
