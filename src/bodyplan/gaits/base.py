@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from bodyplan.arrays import Array
@@ -26,6 +26,8 @@ class Gait(ABC):
     kind: ClassVar[str] = ""
     #: dimension (of ``bodyplan.units``) of every option that has one, for mission files
     UNITS: ClassVar[Mapping[str, str]] = {}
+    #: patterns of names of facts that a plan has only where an optional library is installed
+    OPTIONAL_FACTS: ClassVar[Sequence[str]] = ()
 
     @abstractmethod
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:

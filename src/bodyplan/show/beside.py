@@ -7,6 +7,7 @@ import difflib
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cache
 from typing import Any
 
@@ -85,10 +86,12 @@ def check_units(rows: Sequence[Any]) -> None:
             raise InputError(f"paper, row {row.what!r}: {error}") from error
 
 
-def check_facts(ours: str, facts: Collection[str], mission: str) -> None:
-    """UnknownNameError for a fact of the plan that this mission's planner does not give."""
+def check_facts(ours: str, facts: Collection[str], mission: str, optional: Sequence[str] = ()) -> None:
+    """UnknownNameError for a fact of the plan that this mission's planner does not give; ``optional``: patterns of
+    names that it may leave out."""
     for metric in metrics_in(ours):
-        if metric.mission in (None, mission) and metric.group == "plan" and metric.name not in facts:
+        mine = metric.mission in (None, mission) and metric.group == "plan" and metric.name not in facts
+        if mine and not any(fnmatchcase(metric.name, pattern) for pattern in optional):
             raise UnknownNameError("fact of the plan", metric.name, facts, where=f"paper: ours = {ours!r}")
 
 

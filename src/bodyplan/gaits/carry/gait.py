@@ -53,13 +53,19 @@ class Carry(Gait):
     they slip sideways is a fact of the motion, not assumed away. Statuses, a sample: ``out_of_reach`` (a radius that
     no q makes), ``no_contact``, ``below_floor`` (an axle or the hull in the ground), ``limit`` (an adjusting joint too
     fast), ``jumps`` (the ground bends like the rim), ``stands_still`` (a path without a direction), ``curve_ended``,
-    ``not_converged``; ``motion.notes`` name the wheel and the time.
+    ``not_converged``, ``slips`` and ``tips_over`` (no forces of the ground hold the body at rest); ``motion.notes``
+    name the wheel and the time.
+
+    ``motion.forces`` and ``motion.torques`` are the statics of every sample: of all forces within the friction cones
+    that balance the weight those of least square, and by virtual work what they ask of the motors (eq. (34) with its
+    sign mended); see :func:`bodyplan.gaits.carry.forces`. Robots of fewer than three wheels have none.
 
     Raises InputError for values out of range and options that do not go together, UnknownNameError for names.
     """
 
     kind: ClassVar[str] = "carry"
     UNITS: ClassVar[dict[str, str]] = {"speed": "speed", "ramp": "time", "stop": "time"}
+    OPTIONAL_FACTS: ClassVar[tuple[str, ...]] = ("*_torque", "friction*", "required_friction")
 
     def __init__(
         self,

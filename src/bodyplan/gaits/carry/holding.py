@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 #: share of the weight, of a friction and of a torque that the judge, who finds contacts by sampling rims, may be off by
 BALANCE = 1e-6
-#: samples, evenly chosen, at which the least friction is looked for, and how many more where most is needed: it takes a
-#: cone program each
-EVEN, CLOSER = 25, 12
+#: samples at which the least friction is looked for, a cone program each: evenly chosen, where most friction is used,
+#: and near the one that needs most
+EVEN, PEAKS, CLOSER = 17, 12, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def hold(wheels: Wheels, ground: Ground, body: Carriage, rolled: Rolled, ok: Boo
         except MissingExtraError as error:
             return f"No forces and torques: {error}"
         try:
-            _require(stance, rows[status[rows] == Status.OK.value], required)
+            _require(stance, rows[status[rows] == Status.OK.value], ratio.max(axis=1), required)
         except MissingExtraError as error:
             unknown = f"The least friction that holds the body is not known: {error}"
     held = np.isfinite(found).all(axis=(1, 2))
@@ -92,8 +92,9 @@ def hold(wheels: Wheels, ground: Ground, body: Carriage, rolled: Rolled, ok: Boo
     )
 
 
-def _require(stance: Stance, rows: IntArray, required: Array) -> None:
-    """The least friction at some of the samples ``rows`` into ``required``: evenly, and closer where it is most."""
+def _require(stance: Stance, rows: IntArray, used: Array, required: Array) -> None:
+    """The least friction at some of the samples ``rows`` into ``required``: evenly, where the forces of least square
+    use most (``used`` (T,), which is a bound of it), and closer where it is most."""
     from bodyplan.solve import required_friction
 
     if not len(rows):
@@ -104,13 +105,24 @@ def _require(stance: Stance, rows: IntArray, required: Array) -> None:
         few = stance.take(at)
         required[at] = required_friction(few.points, few.normals, few.center, few.weight).mu
 
-    even = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), EVEN)).round().astype(np.int64))
-    look(even)
-    most = int(np.argmax(required[rows[even]]))
-    near = np.arange(even[max(most - 1, 0)], even[min(most + 1, len(even) - 1)] + 1)
-    near = np.setdiff1d(near[np.unique(np.linspace(0, len(near) - 1, CLOSER).round().astype(np.int64))], even)
+    bound = used[rows]
+    padded = np.concatenate([[-np.inf], bound, [-np.inf]])
+    peaks = np.flatnonzero((padded[1:-1] > padded[:-2]) & (padded[1:-1] >= padded[2:]))
+    peaks = peaks[np.argsort(-bound[peaks], kind="stable")[:PEAKS]]
+    places = np.union1d(_spread(len(rows), EVEN), peaks)
+    look(places)
+    most = int(np.argmax(required[rows[places]]))
+    near = np.arange(places[max(most - 1, 0)], places[min(most + 1, len(places) - 1)] + 1)
+    near = np.setdiff1d(near[_spread(len(near), CLOSER)], places)
+    # nothing is needed beyond what is used
+    near = near[bound[near] > required[rows[places]].max()]
     if len(near):
         look(near)
+
+
+def _spread(count: int, most: int) -> IntArray:
+    """At most so many of ``count`` indices, evenly."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
 def judged(verdict: Verdict, holding: Holding | str, t: Array) -> Verdict:
