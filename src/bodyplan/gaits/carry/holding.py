@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 #: share of the weight, of a friction and of a torque that the judge, who finds contacts by sampling rims, may be off by
 BALANCE = 1e-6
 #: samples at which the least friction is looked for, a cone program each: evenly chosen, where most friction is used,
-#: and near the one that needs most
-EVEN, PEAKS, CLOSER = 17, 12, 10
+#: and in rounds nearer and nearer to the one that needs most
+EVEN, PEAKS, CLOSER, ROUNDS = 17, 12, 7, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +111,16 @@ def _require(stance: Stance, rows: IntArray, used: Array, required: Array) -> No
     peaks = peaks[np.argsort(-bound[peaks], kind="stable")[:PEAKS]]
     places = np.union1d(_spread(len(rows), EVEN), peaks)
     look(places)
-    most = int(np.argmax(required[rows[places]]))
-    near = np.arange(places[max(most - 1, 0)], places[min(most + 1, len(places) - 1)] + 1)
-    near = np.setdiff1d(near[_spread(len(near), CLOSER)], places)
-    # nothing is needed beyond what is used
-    near = near[bound[near] > required[rows[places]].max()]
-    if len(near):
+    for _ in range(ROUNDS):
+        most = int(np.argmax(required[rows[places]]))
+        near = np.arange(places[max(most - 1, 0)], places[min(most + 1, len(places) - 1)] + 1)
+        near = np.setdiff1d(near[_spread(len(near), CLOSER)], places)
+        # nothing is needed beyond what is used
+        near = near[bound[near] > required[rows[places]].max()]
+        if not len(near):
+            return
         look(near)
+        places = np.union1d(places, near)
 
 
 def _spread(count: int, most: int) -> IntArray:
