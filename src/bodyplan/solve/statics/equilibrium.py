@@ -19,11 +19,21 @@ ROUNDING = 1e-11
 
 class Balance(NamedTuple):
     """The equilibrium A x = b of one item: x (3k,) holds (normal, two tangential) components of every contact's force.
-    Rows of A (r, 3k) are orthonormal; ``left`` is the share of the load that no forces whatever can hold."""
+    Rows of A (r, 3k) are orthonormal; ``left`` is the share of the load that no forces whatever can hold. Multipliers
+    y (r,) of the rows stand for the twist ``axes`` y / ``sizes`` of the body, ``axes`` (6, r) and ``sizes`` (r,)."""
 
     A: Array
     b: Array
     left: float
+    axes: Array
+    sizes: Array
+
+
+class Memory(NamedTuple):
+    """Result of an item, apart from the bases it was found in: forces (k, 3) in the world and a twist (6,)."""
+
+    forces: Array
+    twist: Array
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,15 @@ class Loads:
     def newtons(self, x: Array) -> Array:
         """(n, k, 3) N in the world, of components (n, k, 3)."""
         return np.asarray((self.frames @ x[..., None])[..., 0] * self.force[:, None, None])
+
+    def remember(self, i: int, held: Balance, x: Array, y: Array) -> Memory:
+        """Components x (k, 3) and multipliers y of item i, for a similar item."""
+        return Memory((self.frames[i] @ x[..., None])[..., 0], held.axes @ (y / held.sizes))
+
+    def recall(self, i: int, held: Balance, memory: Memory) -> tuple[Array, Array]:
+        """(x, y) for item i."""
+        x = np.einsum("kji,kj->ki", self.frames[i], memory.forces)
+        return x, held.sizes * (held.axes.T @ memory.twist)
 
     def left_over(self, x: Array) -> Array:
         """(n,): the largest entry of force and moment that components (n, k, 3) leave over, as a share of the load."""
@@ -155,7 +174,7 @@ def balance(equations: Array, load: Array) -> Balance:
     rank = int(np.sum(s > RANK * s.max(initial=0.0)))
     held = U[:, :rank].T @ -load
     left = float(np.linalg.norm(load + U[:, :rank] @ held))
-    return Balance(V[:rank], held / s[:rank], left)
+    return Balance(V[:rank], held / s[:rank], left, U[:, :rank], s[:rank])
 
 
 # --- checked input ------------------------------------------------------------------------------------------

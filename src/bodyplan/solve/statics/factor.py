@@ -11,7 +11,7 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.solve.statics.cones import CONE, NOTHING, RAY, Cones, ratios
 from bodyplan.solve.statics.conic import least_excess
 from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, balance
-from bodyplan.solve.statics.polish import PolishedRatio, polish_ratio
+from bodyplan.solve.statics.polish import WARM, PolishedRatio, polish_ratio
 
 #: forces up to this many times the load are looked at first
 MODERATE = 1e2
@@ -23,6 +23,10 @@ NEAR = 1e-3
 MOST = 1e8
 #: residual of the conditions of optimality up to which a solution is one
 PROVED = 1e-11
+
+
+#: x, y and s of a similar problem
+Start = tuple[Array, Array, float]
 
 
 @dataclass(frozen=True)
@@ -67,10 +71,9 @@ class Factor(NamedTuple):
     attained: bool = True
     exact: bool = True
 
-    @property
-    def usable(self) -> bool:
+    def resumable(self, touching: BoolArray) -> bool:
         """Whether a similar item can start from here."""
-        return 0.0 < self.s < np.inf and self.attained and bool(self.kept.all())
+        return 0.0 < self.s < np.inf and self.attained and np.array_equal(self.kept, touching)
 
 
 def holds_with_any_friction(A: Array, b: Array, free: BoolArray) -> bool:
@@ -96,22 +99,21 @@ def along_normals(A: Array, b: Array) -> Array | None:
     return np.asarray(normal) if left <= ROUNDING * max(1.0, float(np.linalg.norm(b))) else None
 
 
-def least_factor(A: Array, b: Array, family: Family, start: Factor | None = None) -> Factor:
+def least_factor(A: Array, b: Array, family: Family, start: Start | None = None) -> Factor:
     """The least s with forces in the cones of ``family`` that balance: A x = b.
 
     The ratio of a fraction's worst case is quasi-convex: s goes to the worst ratio of the forces that exceed the cones
     of the last s by the least (Crouzeix, Ferland and Schaible 1985), each a second-order cone program, and Newton's
-    method finishes. ``start``: the result for a similar item, tried first.
+    method finishes. ``start``: x, y and s of a similar item, tried first.
     """
-    k, r = len(family.slope), len(b)
-    nothing = np.zeros(r)
+    k, nothing = len(family.slope), np.zeros(len(b))
     normal = along_normals(A, b)
     if normal is not None:
         return Factor(0.0, normal[:, None] * np.array([1.0, 0.0, 0.0]), nothing, family.touching)
     if not holds_with_any_friction(A, b, family.kind == CONE):
         return Factor(np.inf, np.zeros((k, 3)), nothing, family.touching)
-    if start is not None and start.usable and len(start.y) == r:
-        done = polish_ratio(A, b, family.at, start.x, start.y, start.s)
+    if start is not None:
+        done = polish_ratio(A, b, family.at, *start, steps=WARM)
         if _proved(A, family, done):
             return Factor(done.s, done.x, done.y, family.touching)
     return _searched(A, b, family)

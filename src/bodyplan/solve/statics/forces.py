@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status, UnknownNameError
 from bodyplan.solve.statics.cones import CONE, RAY, Cones, ratios
-from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, balance, friction
-from bodyplan.solve.statics.factor import Factor, Family, least_factor
+from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, Memory, balance, friction
+from bodyplan.solve.statics.factor import Factor, Family, Start, least_factor
 from bodyplan.solve.statics.item import SHORT, Solved, at_least_factor, solve_item
 from bodyplan.solve.statics.outcome import Outcome, shaped
 
@@ -78,18 +78,22 @@ def contact_forces(
     n = loads.count
     status = np.full(n, Status.OK.value, dtype="<U16")
     reasons, needed = np.full(n, "", dtype=object), np.full(n, np.nan)
-    start: Array | None = None
-    last: Factor | None = None
+    memory: tuple[Memory, float] | None = None
     equations = loads.equations()
     for i in range(n):
         if loads.force[i] == 0.0 or (objective == "min_norm" and np.isfinite(x[i, 0, 0])):
             continue
         held, on = balance(equations[i], loads.load[i]), loads.touching[i]
+        start = None if memory is None else (*loads.recall(i, held, memory[0]), memory[1])
+        memory = None
         if objective == "min_ratio" and held.left <= ROUNDING:
-            solved, last = _least_ratio(held, flat[i], on, last)
+            solved, found = _least_ratio(held, flat[i], on, start)
+            if found.resumable(on):
+                memory = loads.remember(i, held, found.x, found.y), found.s
         else:
-            solved = solve_item(held, flat[i], on, start)
-            start = solved.y if solved.status is Status.OK else None
+            solved = solve_item(held, flat[i], on, None if start is None else start[1])
+            if solved.status is Status.OK and solved.held is held:
+                memory = loads.remember(i, held, solved.x, solved.y), 0.0
         x[i], status[i], reasons[i] = solved.x, solved.status.value, solved.reason
         if solved.status is not Status.OK:
             needed[i] = solved.needed
@@ -120,11 +124,11 @@ def smallest_free(loads: Loads, mu: Array) -> Array:
     return np.asarray(x)
 
 
-def _least_ratio(held: Balance, mu: Array, touching: BoolArray, last: Factor | None) -> tuple[Solved, Factor]:
+def _least_ratio(held: Balance, mu: Array, touching: BoolArray, start: Start | None) -> tuple[Solved, Factor]:
     """The forces of the least worst ratio and of these the smallest; the factor is a start for the next item."""
     alike = bool(np.all(mu[touching] == mu[touching][0]))
     family = Family(np.ones(len(mu)), np.full(len(mu), np.inf) if alike else mu, touching)
-    found = least_factor(held.A, held.b, family, last)
+    found = least_factor(held.A, held.b, family, start)
     if not found.s <= mu[touching].max() * (1.0 + SHORT):
         return solve_item(held, mu, touching), found
     none, why = np.full((len(mu), 3), np.nan), "the forces of the least ratio could not be proved the smallest"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array
 from bodyplan.errors import Status
-from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, balance
+from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, Memory, balance
 from bodyplan.solve.statics.factor import Factor, Family, least_factor
 from bodyplan.solve.statics.item import at_least_factor
 from bodyplan.solve.statics.outcome import Outcome, shaped
@@ -56,7 +56,7 @@ def required_friction(
     status = np.full(n, Status.OK.value, dtype="<U16")
     reasons = np.full(n, "", dtype=object)
     equations = loads.equations()
-    last: Factor | None = None
+    memory: tuple[Memory, float] | None = None
     for i in range(n):
         if loads.force[i] == 0.0:
             continue
@@ -64,7 +64,10 @@ def required_friction(
         family = Family(np.ones(k), np.full(k, np.inf), loads.touching[i])
         found = Factor(np.inf, np.full((k, 3), np.nan), np.zeros(len(held.b)), loads.touching[i])
         if held.left <= ROUNDING:
-            last = found = least_factor(held.A, held.b, family, last)
+            start = None if memory is None else (*loads.recall(i, held, memory[0]), memory[1])
+            found = least_factor(held.A, held.b, family, start)
+        resumable = found.resumable(loads.touching[i])
+        memory = (loads.remember(i, held, found.x, found.y), found.s) if resumable else None
         mu[i], attained[i], x[i] = found.s, found.attained, np.nan
         if not np.isfinite(found.s):
             status[i] = Status.TIPS_OVER.value

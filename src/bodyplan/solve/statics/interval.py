@@ -104,7 +104,7 @@ def torque_interval(
 
 def _end(held: Balance, cones: Cones, gain: Array, x: Array) -> tuple[float, Array, bool]:
     """(largest gain . x, its x, proved)."""
-    A, b, _ = held
+    A, b = held.A, held.b
     k = len(cones.kind)
     push = gain.ravel()
     # the part that the equations determine, and the part that is free

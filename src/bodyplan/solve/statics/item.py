@@ -12,7 +12,7 @@ from bodyplan.solve.statics.cones import CONE, RAY, Cones
 from bodyplan.solve.statics.conic import least
 from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, balance
 from bodyplan.solve.statics.factor import PROVED, Factor, Family, faces, holds_with_any_friction, least_factor
-from bodyplan.solve.statics.polish import polish
+from bodyplan.solve.statics.polish import WARM, polish
 
 #: share by which friction may be short of what is needed, or more than it
 SHORT = 1e-12
@@ -39,11 +39,11 @@ class Solved(NamedTuple):
 
 def smallest(held: Balance, cones: Cones, start: Array | None = None) -> tuple[Array, Array] | None:
     """(x, y) of the smallest norm, exact; None where there is none or it cannot be proved."""
-    A, b, _ = held
+    A, b = held.A, held.b
     k = len(cones.kind)
     gain = np.zeros((k, 3))
-    if start is not None and len(start) == len(b):
-        done = polish(A, b, cones, 1.0, gain, cones.nearest((A.T @ start).reshape(k, 3))[0], start)
+    if start is not None:
+        done = polish(A, b, cones, 1.0, gain, cones.nearest((A.T @ start).reshape(k, 3))[0], start, WARM)
         if done.residual <= PROVED:
             return done.x, done.y
     found = least(A, b, cones, 1.0, gain)
@@ -61,12 +61,12 @@ def on_faces(A: Array, b: Array, cones: Cones) -> Balance:
     rays = cones.kind == RAY
     allowed[rays] = cones.ray[rays][:, :, None] * cones.ray[rays][:, None, :]
     narrow = np.einsum("rki,kij->rkj", A.reshape(-1, k, 3), allowed).reshape(len(b), 3 * k)
-    return balance(narrow, -b) if len(b) else Balance(A, b, 0.0)
+    return balance(narrow, -b)
 
 
 def solve_item(held: Balance, mu: Array, touching: BoolArray, start: Array | None = None) -> Solved:
     """The forces of the smallest norm in cones of coefficients mu (k,)."""
-    A, b, left = held
+    A, b, left = held.A, held.b, held.left
     cones = Cones.of(mu, touching)
     k = len(mu)
     none, nothing = np.full((k, 3), np.nan), np.zeros(len(b))

@@ -10,7 +10,10 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.solve.statics.cones import Cones
 
-STEPS = 40
+#: steps of Newton's method, at most; and from the solution of a similar problem
+STEPS, WARM = 40, 8
+#: residual that is rounding
+NOTHING_LEFT = 3e-16
 #: forces and multipliers beyond this are those of a solver that went astray
 ENDLESS = 1e12
 
@@ -32,7 +35,9 @@ class PolishedRatio(NamedTuple):
     residual: float
 
 
-def polish(A: Array, b: Array, cones: Cones, square: float, gain: Array, x: Array, y: Array) -> Polished:
+def polish(
+    A: Array, b: Array, cones: Cones, square: float, gain: Array, x: Array, y: Array, steps: int = STEPS
+) -> Polished:
     """x with A x = b, x the nearest in its cones to x - (square x - gain - A^T y): then it minimises square |x|^2 / 2 -
     gain . x, since the cones are convex. The nearest point is piecewise smooth, so that Newton's method converges at
     once from near the solution (Qi and Sun 1993)."""
@@ -49,7 +54,7 @@ def polish(A: Array, b: Array, cones: Cones, square: float, gain: Array, x: Arra
         jacobian[size:, :size] = A
         return np.concatenate([u[:size] - near.ravel(), A @ u[:size] - b]), jacobian, near
 
-    u, residual = _newton(system, np.concatenate([x.ravel(), y]))
+    u, residual = _newton(system, np.concatenate([x.ravel(), y]), steps)
     near = system(u)[2]
     missed = float(np.abs(A @ near.ravel() - b).max(initial=0.0))
     scale = max(1.0, float(np.abs(near).max(initial=0.0)))
@@ -57,7 +62,13 @@ def polish(A: Array, b: Array, cones: Cones, square: float, gain: Array, x: Arra
 
 
 def polish_ratio(
-    A: Array, b: Array, cones: Callable[[float], tuple[Cones, Array]], x: Array, y: Array, s: float
+    A: Array,
+    b: Array,
+    cones: Callable[[float], tuple[Cones, Array]],
+    x: Array,
+    y: Array,
+    s: float,
+    steps: int = STEPS,
 ) -> PolishedRatio:
     """The least factor s of cones, ``cones(s)`` with d mu/ds (k,), with A x = b: x is then the nearest in its cones to
     x + A^T y with a y of length 1, which proves that less is not enough."""
@@ -80,21 +91,21 @@ def polish_ratio(
         return np.concatenate(rest), jacobian, near
 
     length = float(np.linalg.norm(y))
-    u, residual = _newton(system, np.concatenate([x.ravel(), y / (length if length > 0.0 else 1.0), [s]]))
+    u, residual = _newton(system, np.concatenate([x.ravel(), y / (length if length > 0.0 else 1.0), [s]]), steps)
     near = system(u)[2]
     missed = float(np.abs(A @ near.ravel() - b).max(initial=0.0))
     return PolishedRatio(near, u[size:-1], float(u[-1]), max(residual, missed))
 
 
-def _newton(system: Callable[[Array], tuple[Array, Array, Array]], u: Array) -> tuple[Array, float]:
+def _newton(system: Callable[[Array], tuple[Array, Array, Array]], u: Array, steps: int) -> tuple[Array, float]:
     """(u, largest residual): the best that Newton's method gets to. Where solutions are not single points directions
     in which nearly nothing changes are held back, by as much as serves best (Levenberg 1944, Marquardt 1963)."""
     if not np.abs(u).max(initial=0.0) < ENDLESS:
         return u, np.inf
     rest, jacobian, _ = system(u)
     best = float(np.linalg.norm(rest))
-    for _ in range(STEPS):
-        if best <= 1e-16 or not np.all(np.isfinite(jacobian)):
+    for _ in range(steps):
+        if best <= NOTHING_LEFT or not np.all(np.isfinite(jacobian)):
             break
         U, s, V = np.linalg.svd(jacobian)
         turned = U.T @ -rest
