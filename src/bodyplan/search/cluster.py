@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -27,7 +27,9 @@ PATIENCE = 60.0
 MOST_WORKERS = 512
 #: environment of workers on this machine: a point in each of them, not a point in all
 ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-LOST = "the process that worked it out ended {} times (stopped by the system, for want of memory perhaps)"
+LOST = "its process ended, also when it was the only point (stopped by the system, for want of memory perhaps)"
+#: a worker has one point at a time, so that the one that ends it takes no other one with it
+DEALING = {"distributed.scheduler.worker-saturation": 1.0, "distributed.scheduler.allowed-failures": 1}
 #: a point to work out: its key and what is changed in the mission
 Job = tuple[str, Sequence[str]]
 
@@ -45,14 +47,28 @@ class Pool:
     def rows(self, payload: Payload, jobs: Iterable[Job], simulate: bool) -> Iterator[tuple[str, Row]]:
         """Key and row of each of ``jobs`` in the order in which they are finished, each exactly once.
 
-        A worker that ends costs no point: another one takes it; a point that ends several of them is "lost". Raises
-        BodyplanError where the workers cannot do the work at all.
+        A worker that ends costs no point: another one takes it. A point that ends several of them is tried once more at
+        the end, alone, since it may have been with the one that did; then it is "lost". Raises BodyplanError where the
+        workers cannot do the work at all.
         """
+        asked = {key: tuple(overrides) for key, overrides in jobs}
+        lost: list[str] = []
+        for key, row in self._rows(payload, asked, simulate, ""):
+            if row.status == "lost":
+                lost.append(key)
+            else:
+                yield key, row
+        for key in lost:
+            yield from self._rows(payload, {key: asked[key]}, simulate, "-alone")
+
+    def _rows(
+        self, payload: Payload, jobs: Mapping[str, tuple[str, ...]], simulate: bool, again: str
+    ) -> Iterator[tuple[str, Row]]:
         # a task of its own, so that a worker that comes late or again gets the files from the scheduler's recipe
         sent: Any = payload
         if payload.files:
             sent = self._client.submit(replace, payload, key=f"bodyplan-mission-{payload.content}")
-        waiting = iter(jobs)
+        waiting = iter(jobs.items())
         done = distributed_().as_completed()
         keys: dict[Any, str] = {}
 
@@ -60,8 +76,8 @@ class Pool:
             job = next(waiting, None)
             if job is not None:
                 key, overrides = job
-                name = f"bodyplan-point-{key}"
-                future = self._client.submit(on_worker, __version__, sent, tuple(overrides), simulate, key=name)
+                name = f"bodyplan-point-{key}{again}"
+                future = self._client.submit(on_worker, __version__, sent, overrides, simulate, key=name)
                 keys[future] = key
                 done.add(future)
             return job is not None
@@ -88,9 +104,7 @@ def _row_of(future: Any) -> Row:
     try:
         row: Row = future.result()
     except distributed_().KilledWorker:
-        import dask
-
-        return Row("lost", LOST.format(dask.config.get("distributed.scheduler.allowed-failures", 3) + 1))
+        return Row("lost", LOST)
     except CancelledError as error:
         raise BodyplanError("the cluster has gone; what is finished is kept, and the same command goes on.") from error
     except BodyplanError:
@@ -135,16 +149,20 @@ def _local(workers: int) -> Iterator[Any]:
     # a script that is not guarded is run again in each process that it starts
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise InputError(GUARD)
+    import dask
+
     try:
-        cluster = distributed_().LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,
-            silence_logs=logging.CRITICAL,
-            env=ONE_THREAD,
-        )
+        with dask.config.set(DEALING):
+            cluster = distributed_().LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+                env=ONE_THREAD,
+                scheduler_kwargs={"dashboard": False},
+            )
     except RuntimeError as error:
         raise InputError(f"the worker processes did not start ({error}). {GUARD}") from error
     with cluster, distributed_().Client(cluster) as client:

@@ -76,6 +76,24 @@ def unit_of(data: Mapping[str, Any], key: str) -> str:
     return "s" if key in _TIMES else ""
 
 
+def value_of(data: Mapping[str, Any], key: str) -> Any:
+    """What a mission has at ``key``: its own value, else the default of that option; None where there is neither."""
+    found: Any = data
+    for part in key.split("."):
+        if isinstance(found, Mapping):
+            found = found.get(part)
+        elif isinstance(found, list) and part.isdigit() and int(part) < len(found):
+            found = found[int(part)]
+        else:
+            found = None
+    section, _, name = key.partition(".")
+    if found is not None or section not in SECTIONS:
+        return found
+    entry = SECTIONS[section].get(str(data[section].get("kind")))
+    option = None if entry is None else inspect.signature(entry[0]).parameters.get(name)
+    return None if option is None or option.default is inspect.Parameter.empty else option.default
+
+
 def labelled(data: Mapping[str, Any], key: str) -> str:
     """ "ground.width (m)"."""
     unit = unit_of(data, key)

@@ -17,10 +17,10 @@ from bodyplan.files import replacing
 from bodyplan.missions import Mission, load_mission
 from bodyplan.missions.files import alone
 from bodyplan.search.cluster import pool
-from bodyplan.search.fields import check_fields, labelled, whole_fields
+from bodyplan.search.fields import check_fields, labelled, value_of, whole_fields
 from bodyplan.search.folder import BEST, PAGE, asked_of, opened, settings_of, write_tables
 from bodyplan.search.measures import Bound, Measure, bound_of, measures_of
-from bodyplan.search.parameters import Range, Value, ranges_of
+from bodyplan.search.parameters import Range, axes_of, ranges_of
 from bodyplan.search.payload import key_of, payload_of
 from bodyplan.search.point import Row
 from bodyplan.search.studies import Objective, Study, Trial, feasible, quiet, sampler_named
@@ -189,6 +189,8 @@ def optimise(
                     row = store.get(point(trial)[0]) or study.remembered(trial)
                     if row is not None:
                         found[trial.number] = row
+
+        def tell_progress() -> None:
             progress(min(len(found), total), total)
 
         def finished() -> Search:
@@ -203,6 +205,7 @@ def optimise(
         ready = None
         try:
             collect()
+            tell_progress()
             while study.told() < total:
                 under_way = {trial.number: (trial, *point(trial)) for trial in study.open_batch()}
                 collect()
@@ -213,7 +216,7 @@ def optimise(
                     for key, row in ready.rows(payload, jobs, simulate):
                         store.add(key, row, missing[key][1])
                         found.update({n: row for n, (_, mine, _, _) in under_way.items() if mine == key})
-                        progress(min(len(found), total), total)
+                        tell_progress()
                 for number, (trial, *_) in under_way.items():
                     study.tell(trial, found[number])
         except KeyboardInterrupt:
@@ -263,14 +266,12 @@ def _said(one: Range) -> Any:
 
 
 def starting(mission: Mission, ranges: Sequence[Range]) -> dict[str, Any]:
-    """The values that the mission itself has, where it says them and they are within the ranges; in their units."""
+    """The values that the mission itself has, its own or by default, where they are within the ranges; in their
+    units."""
     data = tomllib.loads(mission.text)
     out: dict[str, Any] = {}
     for one in ranges:
-        found: Any = data
-        for part in one.key.split("."):
-            found = found.get(part) if isinstance(found, Mapping) else None
-        shown = _shown(found)
+        shown = _shown(value_of(data, one.key))
         if one.choices:
             if any(str(value.shown) == str(shown) for value in one.choices):
                 out[one.key] = str(shown)
@@ -282,12 +283,10 @@ def starting(mission: Mission, ranges: Sequence[Range]) -> dict[str, Any]:
 
 
 def _shown(found: Any) -> Any:
-    from bodyplan.search.parameters import axes_of
-
+    """A value of a mission as a number in SI or a word; None for what is neither."""
     if found is None or isinstance(found, (dict, list)):
         return None
-    value: Value = axes_of({"section.field": [found]})[0].values[0]
-    return value.shown
+    return axes_of({"section.field": [found]})[0].values[0].shown
 
 
 def write(made: Search, asked: Mapping[str, Any]) -> None:
