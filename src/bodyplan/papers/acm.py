@@ -307,7 +307,7 @@ ENTRIES = (
           partial(_frames, SinusLift(ALPHA, LIFT))),
     Entry("(2), (3), Fig. 5", "yaw joints of 20 straight links on the serpenoid", "integral of kappa(l i) ds",
           _literal, "deg",
-          "integral of kappa(s) ds", "the integrand is a constant as printed; E_nm is six times as large by it"),
+          "integral of kappa(s) ds", "the integrand is a constant as printed"),
     Entry("(4)", "shape functions of the serpenoid", "0, (2 pi alpha/L) sin(2 pi s/L)",
           partial(_shape, SERPENOID, lambda s: 0.0 * s, lambda s: 2.0 * np.pi**2 / 3.0 * np.sin(2.0 * np.pi * s)),
           "1/m"),

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.curves import ConcertinaCurve, dynamic_curve
+from bodyplan.curves import GAMMA_STAR, ConcertinaCurve, dynamic_curve
 from bodyplan.curves.dynamic import crossing_of
 from bodyplan.fitting import exact_link_length, links_on_curve
 from bodyplan.gaits import Concertina
@@ -259,7 +259,7 @@ ENTRIES = (
     Entry("(5), Fig. 11", "distance of the head from y = 0 beyond x', all stages", "remains on the line y = 0",
           _lateral),
     Entry("Fig. 12, section IV.A", "jump where a module of gamma 0.8 becomes a straight line", "at the junction",
-          _straight_line, "", "at its own first zero, once gamma >= 0.67645",
+          _straight_line, "", f"at its own first zero, once gamma >= {GAMMA_STAR:.5f}",
           "the curve is not at zero at the junction"),
     Entry("section IV.A", "height left when the tail is stretched", "multiplier at the rate of gamma", _stretched_tail,
           "", "its stage lasts 1/gamma_max of a module's", "1 - gamma_max is left after the time of one module"),

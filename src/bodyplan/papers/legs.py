@@ -295,10 +295,10 @@ ENTRIES = (
           "R_i, R_i S_i, A_i, B_i", _row),
     Entry("(1)", "rates of roll, pitch and yaw of the next frame, relative error", "phi-dot = roll, pitch, yaw rates",
           _rpy_rates, "%", "phi-dot = omega, body-fixed", "the equations hold for angular velocities only"),
-    Entry("(6), (7)", "P of a leg", "D_0 D_1 ... D_n-1", _product, "",
-          "D_n-1 ... D_1 D_0; Q = [D_n-1 ... D_1 E_0 | ... | E_n-1]",
+    Entry("(6), (7)", "P of a leg", "D_0 D_1 ... D_(n-1)", _product, "",
+          "D_(n-1) ... D_1 D_0; Q = [D_(n-1) ... D_1 E_0 | ... | E_(n-1)]",
           "twists pass from the body to the foot: the last row comes first"),
-    Entry("(8), (9)", "velocities of four feet of a moving SILO4", "V_SE = P V_BY + Q dGamma/dt", _composite, "m/s",
+    Entry("(8), (9)", "velocities of four feet of a moving SILO4", "V_SE = P V_BY + Q Gamma'", _composite, "m/s",
           tolerance=1e-8),
     Entry("(8), (9)", "rows of P, 6 m", "24", partial(_size, "P", 0)),
     Entry("(8), (9)", "columns of Q, m r", "24", partial(_size, "Q", 1)),
@@ -338,11 +338,11 @@ ENTRIES = (
     Entry("(20)", "gravity in the body's axes", "(s b, -s a c b, -c a c b)", _gravity),
     Entry("(22)", "unstable stances of three feet with a positive product", "0", _positive_products, "%",
           "min mu, or a barrier on the hull", "two negative mu make a positive product: it is no test of stability"),
-    Entry("(22)", "psi at 6 deg of roll and pitch", "k1 prod(mu - k2 a^2 - k3 b^2)", _bracket, "",
-          "k1 prod(mu) - k2 a^2 - k3 b^2", "the bracket is not what the text describes"),
+    Entry("(22)", "psi at 6 deg of roll and pitch", "k_1 prod(mu - k_2 a^2 - k_3 b^2)", _bracket, "",
+          "k_1 prod(mu) - k_2 a^2 - k_3 b^2", "the bracket is not what the text describes"),
     Entry("(22)", "height of the body where raising psi ends, x and y commanded", "> 0", _crouch, "mm",
           "a height in psi or among the commands",
-          "mu grows as the body sinks: it crouches, from 207 mm to the ground"),
+          "mu grows as the body sinks: it crouches from 207 mm down to the ground"),
 )  # fmt: skip
 
 PAPER = Paper(

@@ -38,8 +38,9 @@ def pretty(text: str) -> str:
     out = re.sub(r"(?<=[A-Za-zα-ωΑ-Ω)])_([A-Za-z0-9]+(?:,[a-z0-9]+)?)", r"<sub>\1</sub>", out)
     out = re.sub(r"\^\(([^)]*)\)", r"<sup>\1</sup>", out)
     out = re.sub(r"\^(-?[A-Za-z0-9]+)", r"<sup>\1</sup>", out)
-    out = re.sub(r"\bsqrt(?=[ (])", "√", out)
-    return out.replace(" - ", " − ").replace("(-", "(−").replace(" -", " −")
+    out = re.sub(r"\bsqrt ?(?=[\d(])", "√", out)
+    # signs: a hyphen that nothing stands before, but in an option's name
+    return re.sub(r"(?:(?<=^)|(?<=[ (\[]))-(?=[^-])", "−", out)
 
 
 def unit_text(unit: str) -> str:
@@ -48,8 +49,10 @@ def unit_text(unit: str) -> str:
 
 
 def with_unit(text: str, unit: str) -> str:
-    """A printed or computed number and its unit; "°" without a space."""
-    shown = text.replace("-", "−")
+    """A printed or computed number and its unit as HTML; "°" without a space."""
+    number, _, power = text.partition("e")
+    shown = f"{number}×10<sup>{int(power)}</sup>" if power else number
+    shown = shown.replace("-", "−")
     if not unit:
         return shown
     return f"{shown}°" if unit == "deg" else f"{shown}\u00a0{unit_text(unit)}"
@@ -59,11 +62,10 @@ def off_text(row: Row, value: float | None) -> str:
     """How far a formula is off."""
     if value is None:
         return "undefined"
-    return (
-        "exact"
-        if value == 0.0
-        else f"off by {figure(value, digits=2)}{'' if row.unit == 'deg' else ' '}{unit_text(row.unit)}".rstrip()
-    )
+    if value == 0.0:
+        return "exact"
+    unit = "" if not row.unit else f"\u00a0{row.unit if row.unit == 'deg' else unit_text(row.unit)}"
+    return f"off by {figure(value, digits=2 if value < 99.5 else 4)}{unit}"
 
 
 def cells(row: Row) -> tuple[str, str, str, str]:
@@ -77,9 +79,9 @@ def cells(row: Row) -> tuple[str, str, str, str]:
         printed = f"{pretty(row.printed)}<small>{off_text(row, row.printed_off)}</small>"
         shown = pretty(row.correct) if row.correct and row.verdict is Verdict.CORRECTED else "the same"
         return esc(row.place), what, printed, f"{shown}<small>{off_text(row, row.ours_off)}</small>"
-    printed = with_unit(row.printed, row.unit) if row.printed_value is not None else pretty(row.printed)
+    printed = with_unit(esc(row.printed), row.unit) if row.printed_value is not None else pretty(row.printed)
     ours = with_unit(row.ours_text, row.unit) if row.ours_text else "–"
-    return esc(row.place), what, esc(printed) if row.printed_value is not None else printed, esc(ours) + here
+    return esc(row.place), what, printed, ours + here
 
 
 def rows_table(rows: Sequence[Row]) -> str:
@@ -95,7 +97,7 @@ def _paper(paper: Paper, done: Recomputed, drawn: Sequence[Drawn]) -> str:
     kinds = [counted(n, name) for n, name in
              ((paper.tables, "table"), (paper.figures, "figure"), (paper.equations, "equation")) if n]  # fmt: skip
     counts = [f"{done.counts[verdict.value]} {verdict.value}" for verdict in Verdict if done.counts[verdict.value]]
-    out += f"<p>{esc(listed(kinds))}, each of them covered by {len(done.rows)} entries: {esc(listed(counts))}.</p>"
+    out += f"<p>{esc(listed(kinds))}, all of them covered by {len(done.rows)} entries: {esc(listed(counts))}.</p>"
     for verdict, title in TITLES.items():
         rows = [row for row in done.rows if row.verdict is verdict]
         if not rows:
@@ -108,7 +110,7 @@ def _paper(paper: Paper, done: Recomputed, drawn: Sequence[Drawn]) -> str:
     if drawn:
         out += "<h3>Figures redrawn</h3>"
     for made in drawn:
-        caption = f"<figcaption><b>{esc(made.place)}</b> {esc(made.caption)}</figcaption>"
+        caption = f"<figcaption><b>{esc(made.place)}</b> {pretty(made.caption)}</figcaption>"
         inside = (
             picture(made.svg, f"{made.place}: {made.caption}")
             if made.svg
@@ -124,8 +126,9 @@ def _head(results: Results) -> str:
     about = (
         "Every number, table, figure and equation that can be computed is computed by bodyplan and set beside what is "
         "printed. Numbers decide: <b>reproduced</b> means equal to the last printed digit, or an equation that agrees "
-        "with a third way of computing; <b>corrected</b> means that what is printed misses and ours does not, with what "
-        "is right; <b>not reproducible</b> means that hardware, missing data or a contradiction stands in the way."
+        "with a third way of computing; <b>corrected</b> means that what is printed misses and ours does not, and says "
+        "what is right; <b>not reproducible</b> means that hardware, missing data or a contradiction stands in the "
+        "way. A &lt; or &gt; stands for a claim in words."
     )
     notes = {
         Verdict.REPRODUCED: "to the digits printed",
@@ -142,7 +145,7 @@ def _head(results: Results) -> str:
     physics = (
         ""
         if results.physics
-        else "<p>Entries that need the physics were left out; <code>--physics</code> runs them.</p>"
+        else '<p class="physics">Entries that need the physics were left out; <code>--physics</code> runs them.</p>'
     )
     out = (
         f'<header><p class="kicker">bodyplan papers</p><h1>{esc(title)}</h1><p>{about}</p></header>'

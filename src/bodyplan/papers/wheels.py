@@ -260,8 +260,11 @@ def _misread(what: str) -> float:
 
 
 _MISSION_1 = "no reading of the equations gives it"
+_NEEDED = (
+    LINK * COS_30 * float(np.subtract(*np.cos(np.radians([float(TABLE_2["fl"][0]), float(TABLE_2["fr"][0])]) / 2.0)))
+)
 _MISSION_2 = (
-    "the printed angles need a slope x width of 0.185 m, and 0.2 x 1.2 m is 0.24 m; the best reading misses by 14 deg"
+    f"the printed angles need a slope x width of {_NEEDED:.3f} m; section 7 and Table 1 have 0.2 x 1.2 m = 0.24 m"
 )
 
 
@@ -287,7 +290,7 @@ ENTRIES = (
     Entry("(1)", "radius of a wheel", "w cos(q/2) cos(pi/6) + R_ru", _radius, "mm"),
     Entry("(2), (3)", "angle to the ground's normal, largest on mission 1's circle",
           "(-grad f/|grad f|, 1), made a unit vector", _normal, "deg", "(-f_x, -f_y, 1), made a unit vector",
-          "the gradient is normalised too: 42 to 44 deg off, and undefined where the ground is level"),
+          "the gradient is normalised too; undefined where the ground is level"),
     Entry("(4)", "orientation: distance of R^T R from 1", "third row of T_y (sin, 0, cos)", _orientation, "",
           "(-sin, 0, cos); R = Ry Rx Rz", "a sign is lost"),
     Entry("(5), (6)", "height of the body, mission 1", "h along the normal", _height, "mm",
@@ -341,10 +344,10 @@ ENTRIES = (
           lambda: _estimate(str(np.degrees(_misread("smallest")))), "N*m", reason="the nearest that any reading comes"),
     Entry("Fig. 12, (35)", "largest torque, mission 1", "4", partial(_fact, "largest_paper_torque"), "N*m"),
     Entry("Fig. 12, (34)", "largest torque, mission 1, statics of least norm", "4",
-          lambda: float(max(np.abs(wheel.adjust).max() for wheel in held())), "N*m", "6.0 N m at the rear",
+          lambda: float(max(np.abs(wheel.adjust).max() for wheel in held())), "N*m", "torques by statics, (25) to (34)",
           "(35) is not conservative: the rear wheel carries half of the weight"),
     Entry("Fig. 14, section 7", "headings at which a level body is in reach on slope 0.2", "100", partial(_headings,
-          0.2), "%", "up to slope 0.1966", "the wheels' radii do not span the slope at the others"),
+          0.2), "%", "all headings on gentler slopes only", "the wheels' radii do not span the slope at the others"),
     *_table_2(),
 )  # fmt: skip
 

@@ -33,10 +33,8 @@ def _made(kind: str) -> tuple[Robot, Robot]:
 def _fits(kind: str, figure: Figure) -> None:
     planar, spatial = _made(kind)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.25))
-    _overlay(left, Serpenoid(np.pi / 3.0), planar, np.eye(3)[:2])
-    left.set_title("(a) serpenoid", fontsize=9)
-    _overlay(middle, Spiral(), spatial, SLANT)
-    middle.set_title("(b) spiral", fontsize=9)
+    _overlay(left, "(a) serpenoid", Serpenoid(np.pi / 3.0), planar, np.eye(3)[:2])
+    _overlay(middle, "(b) spiral", Spiral(), spatial, SLANT)
     found = fit(Serpenoid(np.pi / 3.0), planar, p=None if kind == "straight" else P)
     s = np.linspace(0.0, 1.0, 600)
     turning = found.turning(s)
@@ -47,13 +45,14 @@ def _fits(kind: str, figure: Figure) -> None:
     right.set_ylabel("φ (rad)")
 
 
-def _overlay(ax: Axes, curve: Any, robot: Robot, view: Any) -> None:
+def _overlay(ax: Axes, title: str, curve: Any, robot: Robot, view: Any) -> None:
     found = fit(curve, robot, p=None if "straight" in robot.name else P)
     s = np.linspace(0.0, 1.0, 401)
     ax.plot(*(view @ found.curve_points(s).T), color=CURVE, linewidth=4.0, alpha=0.5, label="curve")
     ax.plot(*(view @ found.points(s).T), color=MECHANISM, linewidth=1.4, label="mechanism")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.text(0.02, 0.02, f"E_nm = {float(found.error):.2e}", transform=ax.transAxes, fontsize=7.5)
+    mantissa, power = f"{float(found.error):.2e}".split("e")
+    ax.set_title(f"{title}: $E_{{nm}}$ = {mantissa}·10$^{{{int(power)}}}$", fontsize=9)
     ax.set_xticks([])
     ax.set_yticks([])
     ax.legend(fontsize=7, loc="upper left")
@@ -75,24 +74,25 @@ def _tips(figure: Figure) -> None:
 
 def _lifted(figure: Figure) -> None:
     alpha, lift = 5.0 * np.pi / 12.0, 0.3
-    s = np.linspace(0.0, 2.0, 500)
+    s = np.linspace(0.0, 3.0, 700)
     top, side = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
-    for c1, color, style, name in (
-        ("paper", PLANNED, "--", "c1 by (37), −0.0919"),
-        (None, EXECUTED, "-", "level c1, −0.0895"),
-    ):
-        points, frames = SinusLift(alpha, lift, c1=c1).frames(s)
-        # seen from the first frame's level: x along the way from start to end
-        way = points[-1] / np.linalg.norm(points[-1])
-        up = frames[0][:, 2] - (frames[0][:, 2] @ way) * way
-        up /= np.linalg.norm(up)
-        across = np.cross(up, way)
-        top.plot(points @ way, points @ across, style, color=color, label=name)
-        side.plot(points @ way, points @ up, style, color=color)
+    level = SinusLift(alpha, lift).frames(s)[0]
+    # it starts where it bends neither way, with its belly down: its own z is up
+    way = level[-1, :2] / np.linalg.norm(level[-1, :2])
+    curves = (
+        (SinusLift(alpha, lift, c1="paper"), PLANNED, "--", "c1 by (37)"),
+        (SinusLift(alpha, lift), EXECUTED, "-", "level"),
+    )
+    for curve, color, style, name in curves:
+        points = curve.frames(s)[0]
+        top.plot(
+            points[:, :2] @ way, points[:, :2] @ [-way[1], way[0]], style, color=color, label=f"{name}, {curve.c1:.4f}"
+        )
+        side.plot(points[:, :2] @ way, points[:, 2], style, color=color)
     top.set_ylabel("y / L_a")
     side.set_ylabel("z / L_a")
     side.set_xlabel("x / L_a")
-    top.legend(fontsize=8)
+    figure.legend(loc="outside upper right", fontsize=8, ncols=2)
 
 
 DRAWINGS = (
@@ -100,5 +100,5 @@ DRAWINGS = (
     Drawing("Fig. 7", "10 arc-shaped joints, p = 0.789", partial(_fits, "arc"), 2.9),
     Drawing("Fig. 10", "Tips of an arc and of a double joint of equal length and angle, ±180°", _tips, 3.4),
     Drawing("Fig. 12", "10 double joints, R_s = 0.18", partial(_fits, "double"), 2.9),
-    Drawing("Fig. 13", "Sinus-lifting over two wavelengths, from above and from the side", _lifted, 3.4),
+    Drawing("Fig. 13", "Sinus-lifting over three wavelengths, from above and from the side", _lifted, 3.4),
 )

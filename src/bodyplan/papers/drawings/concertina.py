@@ -25,7 +25,7 @@ def _dynamic(figure: Figure) -> None:
         ax.plot(x, dynamic_curve(x, gamma), color=color, label=f"γ = {gamma:g}")
     ax.set_xlabel("x")
     ax.set_ylabel("F(x)")
-    ax.legend(fontsize=8, ncols=3)
+    figure.legend(loc="outside upper right", fontsize=8, ncols=6)
 
 
 def _modules(figure: Figure) -> None:
@@ -42,7 +42,7 @@ def _modules(figure: Figure) -> None:
     ax.set_ylim(-1.25, 1.35)
     ax.set_xlabel("x")
     ax.set_ylabel("y")
-    ax.legend(fontsize=8, loc="lower right")
+    figure.legend(loc="outside upper right", fontsize=8)
 
 
 def _crossings(figure: Figure) -> None:
@@ -51,11 +51,13 @@ def _crossings(figure: Figure) -> None:
         ax.plot(x, dynamic_curve(x, gamma), color=color, label=f"γ = {gamma:g}")
         at = float(crossing_of(gamma, 1.0, 2))
         ax.plot(at, 0.0, "o", color=color, markersize=5)
-        ax.annotate(f"x'$_{k + 1}$ = {at:.3f}", (at, 0.0), (at - 0.25, 0.28 + 0.24 * k), fontsize=7.5, color=color)
+        place = (at - (0.9 if k == 0 else 0.2), (0.3, -0.4, 0.3, 0.3)[k])
+        ax.annotate(f"x'$_{k + 1}$ = {at:.3f}", (at, 0.0), place, fontsize=8, color=color,
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})  # fmt: skip
     ax.axhline(0.0, color="#555", linewidth=0.8)
     ax.set_xlabel("x")
     ax.set_ylabel("F(x)")
-    ax.legend(fontsize=8, loc="lower right", ncols=2)
+    figure.legend(loc="outside upper right", fontsize=8, ncols=4)
 
 
 def _head(figure: Figure) -> None:

@@ -31,16 +31,17 @@ def _moves(x: tuple[float, float, float], figure: Figure) -> None:
         ax.set_title(f"{name} moves {1e3 * drives[k]:.0f} mm", fontsize=9)
         ax.set_aspect("equal")
         ax.set_xlabel("x (mm)")
+        ax.locator_params(axis="x", nbins=4)
         before = after
     panels[0].set_ylabel("z (mm)")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower right", ncols=2, fontsize=8)
+    figure.legend(handles, labels, loc="outside upper right", ncols=2, fontsize=8)
 
 
 DRAWINGS = (
     Drawing(
-        "Fig. 7", "Configuration 0.3 / 0.7, entering: one cycle by the 60 % rule", partial(_moves, (1.0, 2.2, 5.0))
+        "Fig. 7", "Configuration 0.3 / 0.7, entering: one cycle by the 60 % rule", partial(_moves, (1.0, 2.2, 5.0)), 1.8
     ),
-    Drawing("Fig. 9", "Configuration 0.7 / 0.3, exiting", partial(_moves, (1.0, 3.8, 5.0))),
-    Drawing("Fig. 10", "Configuration 1 / 1, which stretches its legs fully", partial(_moves, (1.0, 5.0, 9.0))),
+    Drawing("Fig. 9", "Configuration 0.7 / 0.3, exiting", partial(_moves, (1.0, 3.8, 5.0)), 1.8),
+    Drawing("Fig. 10", "Configuration 1 / 1, which stretches its legs fully", partial(_moves, (1.0, 5.0, 9.0)), 1.8),
 )
