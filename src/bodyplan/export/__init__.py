@@ -69,6 +69,7 @@ FORMATS: dict[str, Format] = {
             "C99 header of the sampled trajectory, for a microcontroller",
             infix="_trajectory",
         ),
+        Format("urdf", ".urdf", "urdf", "robot alone, for ROS, Pinocchio, simulators"),
         Format("c", ".c", "c_model", "C99 source and header of the robot's kinematics", "symbolic"),
     )
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from bodyplan.robot.elements import Contact
 
 #: how far a turn may be off one by right angles (of a box) or about z (of a disc)
 ALIGNED = 1e-12
+#: how far a ball may be off the end of a cylinder, m
+SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,24 @@ def contact_of(shape: Shape, frame: str) -> tuple[Contact, Array | None]:
     reach = 0.5 * length - radius * (kind == "cylinder")
     ends = _point(at - reach * R[:, 2]), _point(at + reach * R[:, 2])
     return Contact(shape.name, frame, "capsule", radius, *ends, friction=shape.friction), None
+
+
+def rounded(shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
+    """The shapes of a link, a cylinder with a ball of its radius on either end as the capsule that URDF cannot say."""
+    out = list(shapes)
+    for tube in shapes:
+        if tube.kind == "cylinder":
+            ends = (tube.place[:3, 3] + 0.5 * side * tube.sizes[1] * tube.place[:3, 2] for side in (-1.0, 1.0))
+            balls = [next((s for s in out if _is_ball(s, tube.sizes[0], end)), None) for end in ends]
+            if balls[0] is not None and balls[1] is not None:
+                out = [s for s in out if s is not balls[0] and s is not balls[1]]
+                out[next(i for i, s in enumerate(out) if s is tube)] = replace(tube, kind="capsule")
+    return tuple(out)
+
+
+def _is_ball(shape: Shape, radius: float, at: Array) -> bool:
+    off = (shape.sizes[0] - radius, *(shape.place[:3, 3] - at))
+    return shape.kind == "sphere" and bool(np.abs(off).max() <= SAME)
 
 
 def _point(values: Array) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ from bodyplan.robot.drive_text import located
 from bodyplan.robot.elements import Body, Contact, Joint
 from bodyplan.robot.files import read_text
 from bodyplan.robot.reading.rows import Screw, along, axis_frame
-from bodyplan.robot.reading.shapes import Shape
+from bodyplan.robot.reading.shapes import Shape, rounded
 from bodyplan.robot.reading.tree import Link, Parts, Tree, parts_of, unique
 
 MOVING = ("revolute", "continuous", "prismatic")
@@ -277,7 +277,7 @@ def _shapes(links: Mapping[str, ET.Element]) -> dict[str, tuple[Shape, ...]]:
     out: dict[str, tuple[Shape, ...]] = dict.fromkeys(links, ())
     for (link, _, kind, sizes, place), name in zip(found, names, strict=True):
         out[link] += (Shape(name, kind, sizes, place),)
-    return out
+    return {link: rounded(shapes) for link, shapes in out.items()}
 
 
 # --- numbers ------------------------------------------------------------------------------------------------
