@@ -231,9 +231,8 @@ _NO_NUMBERS = "drawing or photograph of an animal without numbers"
 
 ENTRIES = (
     Entry("Figs. 1-3, 5, section II", "scales and stages of real snakes", reason=_NO_NUMBERS),
-    Entry("section II",
-          "resistance backward over forward of scales, four to five; cost of concertina, seven times others'",
-          "4", reason="measured on animals by others"),
+    Entry("section II", "resistance of scales backward over forward; cost of concertina over that of other gaits",
+          "four to five; seven", reason="measured on animals by others"),
     Entry("(1), Fig. 4", "dynamic curve, gamma up to 0.99", "exp(-alpha x)/beta sin(delta x + theta)",
           partial(_dynamic, (0.0, 0.3, 0.6, 0.9, 0.99))),
     Entry("(1), Fig. 4", "dynamic curve at gamma = 1, the most stretched", "exp(-alpha x)/beta sin(delta x + theta)",

@@ -80,7 +80,7 @@ def cells(row: Row) -> tuple[str, str, str, str]:
         shown = pretty(row.correct) if row.correct and row.verdict is Verdict.CORRECTED else "the same"
         return esc(row.place), what, printed, f"{shown}<small>{off_text(row, row.ours_off)}</small>"
     printed = with_unit(esc(row.printed), row.unit) if row.printed_value is not None else pretty(row.printed)
-    ours = with_unit(row.ours_text, row.unit) if row.ours_text else "–"
+    ours = with_unit(row.ours_text, row.unit) if row.ours_text else "–" if printed else ""
     return esc(row.place), what, printed, ours + here
 
 

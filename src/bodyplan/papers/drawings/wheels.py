@@ -22,7 +22,7 @@ def _path(figure: Figure) -> None:
     x, y = np.meshgrid(np.linspace(-2.0, 2.0, 81), np.linspace(-2.0, 2.0, 81))
     z = HILLS.height(np.stack([x, y], axis=-1))
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.3))
-    filled = left.contourf(x, y, 1e3 * z, levels=12, cmap="YlGn")
+    filled = left.contourf(x, y, 1e3 * z, levels=12, cmap="YlGn", alpha=0.5)
     figure.colorbar(filled, ax=left, label="ground (mm)", shrink=0.8)
     left.plot(*motion.base[:, :2].T, color=EXECUTED, label="body")
     poses = motion.poses()
