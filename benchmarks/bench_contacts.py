@@ -108,11 +108,11 @@ def main() -> None:
     motion = bp.plan(ROBOT, carry, GROUND, t)
     compare(
         {
-            "plan: contacts, rates, accelerations, spins": (lambda: bp.plan(ROBOT, carry, GROUND, t), 1),
-            "check: 512 points of each rim, rolling, hull": (lambda: bp.check(motion), 1),
+            "plan: contacts, rates, accelerations, spins, forces": (lambda: bp.plan(ROBOT, carry, GROUND, t), 1),
+            "check: 512 points of each rim, rolling, hull, forces": (lambda: bp.check(motion), 1),
         },
         unit="mission",
-        against="check: 512 points of each rim, rolling, hull",
+        against="check: 512 points of each rim, rolling, hull, forces",
         rounds=7,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
+from weakref import ref
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def rim_touches(motion: Motion, positions: Array, claim: Claim) -> Line:
     worst, when, which = 0.0, int(samples[0]), ""
     for name in claim.data["contacts"]:
         k, contact = contact_of(motion, str(name))
-        gaps = _lowest(motion, k, contact, samples, *TOUCHING)[0]
+        gaps = _touching(motion, k, contact, samples)[0]
         i = int(np.abs(gaps).argmax())
         if not which or abs(gaps[i]) > abs(worst):
             worst, when, which = float(gaps[i]), int(samples[i]), contact.name
@@ -162,7 +163,22 @@ def _over(ground: Ground, points: Array) -> Array:
 
 def lowest_points(motion: Motion, k: int, contact: Contact, samples: IntArray) -> Array:
     """Where a rim is lowest over the ground (s, 3) m, at ``samples``."""
-    return _lowest(motion, k, contact, samples, *TOUCHING)[1]
+    return _touching(motion, k, contact, samples)[1]
+
+
+#: what is known of the rims of motions that are still there, by id: several claims ask for the same
+_known: dict[int, tuple[ref[Motion], dict[tuple[int, bytes], tuple[Array, Array]]]] = {}
+
+
+def _touching(motion: Motion, k: int, contact: Contact, samples: IntArray) -> tuple[Array, Array]:
+    """Gaps (s,) m and lowest points (s, 3), each looked for once a motion."""
+    key, asked = id(motion), (k, samples.tobytes())
+    mine = _known.get(key)
+    if mine is None or mine[0]() is not motion:
+        mine = _known[key] = ref(motion, lambda _: _known.pop(key, None)), {}
+    if asked not in mine[1]:
+        mine[1][asked] = _lowest(motion, k, contact, samples, *TOUCHING)
+    return mine[1][asked]
 
 
 def samples_of(motion: Motion, claim: Claim) -> IntArray:
