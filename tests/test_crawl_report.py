@@ -5,7 +5,9 @@ import pytest
 
 import bodyplan as bp
 from bodyplan.gaits.crawl import null_space
-from bodyplan.show.crawling import crawling_plots, crawling_section, is_crawl, walk_figure
+from bodyplan.show.crawling import crawling_plots, crawling_section
+from bodyplan.show.crawling_figures import walk_figure
+from bodyplan.show.crawling_loads import is_crawl, loads_of, loads_plots, loads_text
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +62,32 @@ def test_equation_22_crouches_and_the_barrier_keeps_height(benefits):
 def test_levelling_is_real(benefits):
     for choice in ("printed", "text", "barrier"):
         assert benefits[choice].pitch < 0.7 * benefits["off"].pitch
+
+
+def test_loads_balance_and_friction_is_the_slope():
+    gait = bp.Crawl(velocity=(0.012, 0.0), cycle_time=12.0)
+    level, slope = (
+        loads_of(bp.plan(bp.silo4(), gait, bp.Plane(slope=tilt), bp.times(0, 6, dt=0.05)))
+        for tilt in ((0.0, 0.0), (0.15, 0.1))
+    )
+    assert np.abs(np.nansum(level.normal, axis=1) - 30.0 * 9.81).max() < 1e-6
+    assert np.abs(level.needed).max() < 1e-6
+    # all normals are one: the friction is the tangent of the slope, the loads carry what is across it
+    steep = np.hypot(0.15, 0.1)
+    assert np.abs(slope.needed - steep).max() < 1e-6
+    assert np.abs(np.nansum(slope.normal, axis=1) - 30.0 * 9.81 / np.hypot(1.0, steep)).max() < 1e-6
+    assert np.isnan(slope.normal).any() and np.nanmin(slope.normal) > 0.0
+
+
+def test_loads_are_said_and_drawn(walk):
+    page, found = crawling_section(walk, {}), loads_of(walk)
+    assert "What the feet carry" in page and f"{np.nanmax(found.normal):.3g}" in page
+    plots = loads_plots(walk)
+    assert [curve["name"] for curve in plots["walk_loads"]["data"]] == list(found.feet)
+    assert set(plots) <= set(crawling_plots(walk))
+
+
+def test_where_it_tips_no_friction_is_enough():
+    gait = bp.Crawl((0.01, 0.0), sway=0, sequence=("fl", "hl", "fr", "hr"))
+    motion = bp.plan(bp.silo4(), gait, bp.Plane(), bp.times(0, 12, dt=0.05))
+    assert np.isinf(loads_of(motion).needed).any() and "there it tips" in loads_text(motion)

@@ -3,24 +3,20 @@ null space of resolved rates would buy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from bodyplan.arrays import Array
 from bodyplan.check.support import polygon_margin
 from bodyplan.errors import BodyplanError
 from bodyplan.gaits.crawl import Benefit, Crawl, null_space
 from bodyplan.motion import Motion
-from bodyplan.robot.masses import center_from_poses
+from bodyplan.show.crawling_loads import is_crawl, loads_plots, loads_text
 from bodyplan.show.layout import layout, line
-from bodyplan.show.series import EXECUTED, PLANNED
+from bodyplan.show.series import LIMIT, PLANNED
 from bodyplan.show.text import degrees, esc, figure, picture, plot, section, table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: what the choices of the null space are called
 NAMES = {
@@ -29,15 +25,8 @@ NAMES = {
     "text": "(22) as its text says",
     "barrier": "barrier on the support polygon, ours",
 }
-#: colours of legs, told apart by colour-blind eyes, too
-LEGS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-#: samples of a long motion that are drawn, and cells of the ground along its longer side
-SAMPLES, CELLS = 1500, 160
-
-
-def is_crawl(motion: Motion) -> bool:
-    """True for the plan of a :class:`bodyplan.Crawl` of a robot with masses."""
-    return motion.gait.get("kind") == Crawl.kind and motion.contacts is not None and motion.robot.mass > 0.0
+#: samples of a long motion that are drawn; how much of the margin over its least is shown
+SAMPLES, SHOWN = 1500, 4.0
 
 
 def crawling_section(motion: Motion, pictures: Mapping[str, str]) -> str:
@@ -55,8 +44,12 @@ def crawling_section(motion: Motion, pictures: Mapping[str, str]) -> str:
     )
     if "walk" in pictures:
         out += picture(pictures["walk"], "Footholds, body and support from above, and the walk from the side")
-    out += plot("walk_margin", "Distance of the centre of mass from the nearest edge of the support polygon, planned.")
-    return section("walk", "On its feet", out + _benefits(motion))
+    out += plot(
+        "walk_margin",
+        "Distance of the centre of mass from the nearest edge of the support polygon while a leg swings, planned; all "
+        "feet stand where it is beyond the top. Red: what the plan was to keep.",
+    )
+    return section("walk", "On its feet", out + loads_text(motion) + _benefits(motion))
 
 
 def _benefits(motion: Motion) -> str:
@@ -113,83 +106,21 @@ def crawling_plots(motion: Motion) -> dict[str, dict[str, Any] | None]:
     chosen = _thin(motion)
     margin = 1e3 * polygon_margin(motion, chosen)
     shown = np.where(np.isfinite(margin), margin, np.nan)
+    t = motion.t[chosen] - motion.t[0]
     made = layout("time (s)", "margin (mm)", 260)
     made["yaxis"]["zeroline"] = True
-    return {"walk_margin": {"data": [line(motion.t[chosen] - motion.t[0], shown, "margin", PLANNED, showlegend=False)],
-                            "layout": made}}  # fmt: skip
+    curves = [line(t, shown, "margin", PLANNED, showlegend=False)]
+    wanted = next((claim.data["required"] for claim in motion.claims if claim.kind == "supported"), None)
+    low, high = float(np.nanmin(shown, initial=0.0)), float(np.nanmin(np.abs(shown), initial=np.inf))
+    if wanted is not None:
+        curves.append(line(t[[0, -1]], np.full(2, 1e3 * float(wanted)), "kept", LIMIT, showlegend=False,
+                           line={"dash": "dash", "width": 1}))  # fmt: skip
+        high = max(high, 1e3 * float(wanted))
+    if np.isfinite(high) and high > 0.0:
+        made["yaxis"]["range"] = [min(0.0, 1.1 * low), SHOWN * high]
+    return {"walk_margin": {"data": curves, "layout": made}} | loads_plots(motion)
 
 
 def _thin(motion: Motion) -> Any:
     count = len(motion.t)
     return np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).round().astype(int))
-
-
-def walk_figure(motion: Motion, new_figure: Callable[[float], Figure]) -> Figure | None:
-    """From above: ground, footholds, body, centre of mass and the support of each swing; the same from the side."""
-    if not is_crawl(motion):
-        return None
-    robot = motion.robot
-    feet = [(k, c) for k, c in enumerate(robot.contacts) if np.asarray(motion.contacts)[:, k].any()]
-    poses = robot.forward(motion.q, motion.base)
-    places = np.stack([poses[c.frame][:, :3] for _, c in feet], axis=1)
-    standing = np.stack([np.asarray(motion.contacts)[:, k] > 0.5 for k, _ in feet], axis=1)
-    center = center_from_poses(robot, poses.array)
-    body = motion.base[:, :3]
-    made = new_figure(8.2)
-    above, side = made.subplots(2, 1, height_ratios=[2.2, 1.0])
-    every = np.concatenate([places.reshape(-1, 3), body])
-    low, high = every.min(axis=0) - 0.08, every.max(axis=0) + 0.08
-    _ground(above, motion.ground, low, high)
-    _supports(above, places, standing)
-    above.plot(body[:, 0], body[:, 1], color="#333333", linewidth=1.2, label="body")
-    above.plot(center[:, 0], center[:, 1], color=EXECUTED, linewidth=0.9, linestyle="--", label="centre of mass")
-    for j, (_, contact) in enumerate(feet):
-        stood = _footholds(places[:, j], standing[:, j])
-        above.plot(stood[:, 0], stood[:, 1], "o", markersize=4, color=LEGS[j % len(LEGS)], label=contact.name)
-        side.plot(places[:, j, 0], places[:, j, 2], color=LEGS[j % len(LEGS)], linewidth=0.8)
-    above.set_aspect("equal", adjustable="box")
-    above.set_xlim(low[0], high[0])
-    above.set_ylim(low[1], high[1])
-    above.set_ylabel("y (m)")
-    above.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=7)
-    x = np.linspace(low[0], high[0], 400)
-    middle = np.interp(x, body[np.argsort(body[:, 0]), 0], body[np.argsort(body[:, 0]), 1])
-    side.plot(x, motion.ground.height(x, middle), color="#8a8f94", linewidth=1.2)
-    side.plot(body[:, 0], body[:, 2], color="#333333", linewidth=1.2)
-    side.set_xlim(low[0], high[0])
-    side.set_xlabel("x (m)")
-    side.set_ylabel("z (m)")
-    side.set_title("from the side: ground under the body, feet, body")
-    above.set_title("from above: footholds, body, and the support of each swing in the first cycle")
-    return made
-
-
-def _ground(ax: Any, ground: Any, low: Array, high: Array) -> None:
-    """The height of the ground as shades, where it is not level."""
-    span = high[:2] - low[:2]
-    nx, ny = (max(2, int(CELLS * s / span.max())) for s in span)
-    x, y = np.meshgrid(np.linspace(low[0], high[0], nx), np.linspace(low[1], high[1], ny))
-    try:
-        z = ground.height(x, y)
-    except BodyplanError:  # beyond the edge of a map
-        return
-    if np.ptp(z) > 1e-9:
-        mesh = ax.pcolormesh(x, y, 1e3 * z, cmap="terrain", alpha=0.45, shading="auto", rasterized=True)
-        ax.figure.colorbar(mesh, ax=ax, label="ground (mm)", shrink=0.7, pad=0.14)
-
-
-def _supports(ax: Any, places: Array, standing: Any) -> None:
-    """The feet that stand, joined round, at the middle of every swing of the first cycle."""
-    swings = np.flatnonzero(np.diff((~standing).any(axis=1).astype(int)) != 0)
-    for start, end in list(zip(swings[0::2], swings[1::2], strict=False))[: standing.shape[1]]:
-        k = (start + end) // 2
-        corners = places[k][standing[k], :2]
-        middle = corners.mean(axis=0)
-        order = np.argsort(np.arctan2(*(corners - middle).T[::-1]))
-        ax.fill(*corners[order].T, facecolor="#56b4e9", alpha=0.12, edgecolor="#56b4e9", linewidth=0.7)
-
-
-def _footholds(place: Array, standing: Any) -> Array:
-    """Places (h, 3) where one foot stood."""
-    begins = np.flatnonzero(standing & ~np.concatenate([[False], standing[:-1]]))
-    return np.asarray(place[begins])

@@ -10,7 +10,7 @@ import numpy as np
 
 from bodyplan.errors import MissingExtraError
 from bodyplan.show.carrying_figures import wheels_above, wheels_maps
-from bodyplan.show.crawling import walk_figure
+from bodyplan.show.crawling_figures import walk_figure
 from bodyplan.show.following_page import following_figure
 from bodyplan.show.grids import grid_figure
 from bodyplan.show.inching_figures import footholds, side_views

@@ -249,6 +249,11 @@ def _notes(planner: Planner, plan: Plan, t: Array, beyond: BoolArray, fast: Arra
         if planner.legs.robot.mass > 0.0
         else "The robot has no mass: its centre of mass is put at the body's frame, as in (19)-(22).",
     ]
+    if planner.shell is None:
+        notes.append(
+            "Only feet are shapes of this robot: whether links or body touch anything is not looked at. Ready robots "
+            "have shapes for them with shell = True."
+        )
     if plan.status != Status.OK:
         notes.append(f"Stops at {plan.time:.4g} s: {plan.reason}.")
     for where, names, what in (
