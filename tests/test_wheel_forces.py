@@ -351,3 +351,8 @@ def test_maps_of_what_tips_over_and_refusals() -> None:
         maps(ROBOT, bp.Plane(), (0.0, 0.0), headings=[1.0, 0.0])
     with pytest.raises(bp.InputError, match="heights"):
         maps(ROBOT, bp.Plane(), (0.0, 0.0), heights=1)
+
+
+def test_the_judge_allows_a_wheel_without_friction() -> None:
+    motion = bp.plan(bp.tri_wheel(friction={"r": 0.0}), bp.Carry("line"), HILLS, bp.times(0, 1, dt=0.1))
+    assert motion.ok and failed(motion) == []

@@ -54,7 +54,7 @@ class Claim:
     * ``clears``: the boxes of ``contacts`` keep ``required`` m from the ground, at the ``samples`` given.
     * ``holds``: the ``forces`` of the motion on the rims of ``contacts``, where they touch, and the weight are in
       balance, but for the share ``tolerance`` of the weight; at the ``samples`` given.
-    * ``grips_ground``: these forces push and stay within cones of ``friction`` (k,), but for the share ``tolerance``.
+    * ``grips_ground``: these forces push and stay within cones of ``friction`` (k,) + ``tolerance``.
     * ``bears``: ``torques`` of the wheels' motors are those of virtual work under these forces.
     * ``presses``: contacts press on ground of ``role`` by at most ``depth`` m (planned overlap that makes grip).
     """

@@ -52,35 +52,30 @@ def holds(motion: Motion, positions: Array, claim: Claim) -> Line:
 
 @on_the_map
 def grips_ground(motion: Motion, positions: Array, claim: Claim) -> Line:
-    """Largest ratio of friction to load that the planned forces need, over the coefficient of the contact: 1 is the
-    limit of sliding."""
+    """Largest ratio of friction to load that the planned forces need, over the contact's coefficient and the claimed
+    tolerance: 1 is the limit of sliding."""
     samples = samples_of(motion, claim)
     if not len(samples):
         return none_left(claim)
     if motion.forces is None:
         return Line(claim.label, None, None, "", False, "the motion has no forces", kind=claim.kind)
-    weight = motion.robot.mass * GRAVITY
-    worst: tuple[float, int, str, float] | None = None
+    weight, slack = motion.robot.mass * GRAVITY, float(claim.data["tolerance"])
+    poses = motion.robot.forward(motion.q[samples], motion.base[samples])
+    worst: tuple[float, str] | None = None
     for name, mu in zip(claim.data["contacts"], np.asarray(claim.data["friction"]), strict=True):
         k, contact = contact_of(motion, str(name))
         points = lowest_points(motion, k, contact, samples)
-        hub = motion.robot.forward(motion.q[samples], motion.base[samples])[contact.frame]
-        force = motion.forces[samples, k]
-        ratio = _ratio(motion.ground, points, hub, force, NONE * weight)
+        ratio = _ratio(motion.ground, points, poses[contact.frame], motion.forces[samples, k], NONE * weight)
         i = int(ratio.argmax())
-        used = ratio[i] / mu if mu > 0.0 else (np.inf if ratio[i] > 0.0 else 0.0)
+        used = float(ratio[i]) / (float(mu) + slack)
         if worst is None or used > worst[0]:
-            worst = float(used), int(samples[i]), contact.name, float(ratio[i])
+            told = f"{ratio[i]:.3g} of {mu:.3g}" if np.isfinite(ratio[i]) else "pulls"
+            worst = used, f"{told}, {contact.name} at {motion.t[samples[i]]:.4g} s"
     if worst is None:
         return none_left(claim)
-    used, at, name, ratio_used = worst
-    limit = 1.0 + float(claim.data["tolerance"])
-    detail = f"{ratio_used:.3g} of {ratio_used / used if used else np.nan:.3g}, {name} at {motion.t[at]:.4g} s"
-    if not np.isfinite(used):
-        return Line(
-            claim.label, None, limit, "", False, f"{name} pulls or slides at {motion.t[at]:.4g} s", kind=claim.kind
-        )
-    return Line(claim.label, used, limit, "", used <= limit, detail, kind=claim.kind)
+    used, detail = worst
+    value = used if np.isfinite(used) else None
+    return Line(claim.label, value, 1.0, "", used <= 1.0, detail, kind=claim.kind)
 
 
 def _ratio(ground: Ground, points: Array, hub: Array, force: Array, none: float) -> Array:

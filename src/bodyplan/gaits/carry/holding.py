@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from bodyplan.gaits.carry.motion import Rolled
     from bodyplan.gaits.carry.verdict import Verdict
 
-#: share of the weight, of a friction and of a torque that the judge, who finds contacts by sampling rims, may be off by
-BALANCE = 1e-6
+#: share of the weight, of a torque, and friction that the judge, who finds contacts by sampling rims, may be off by
+BALANCE = 1e-5
 #: samples at which the least friction is looked for, a cone program each: evenly chosen, where most friction is used,
 #: and in rounds nearer and nearer to the one that needs most
 EVEN, PEAKS, CLOSER, ROUNDS = 17, 12, 7, 3
