@@ -65,10 +65,26 @@ def papers(
     raise typer.Exit(0 if results.ok and not problems else 1)
 
 
+#: how a verdict is marked in the table
+MARKS = {"reproduced": "=", "corrected": "≠", "not reproducible": "–", "differs": "?", "error": "!"}
+
+
 def _print(results: Results) -> None:
+    typer.echo("\n" + ", ".join(f"{mark} {verdict}" for verdict, mark in MARKS.items()))
     for done in results.papers:
         say(f"\n{done.name}: {done.title}", bold=True)
-        print_table(["place", "what", "the paper", "here", "verdict"], [_cells(row) for row in done.rows])
+        print_table(["", "place", "what", "the paper", "here"], [_cells(row) for row in done.rows])
+        typer.echo("")
+        for verdict in ("error", "differs", "corrected", "not reproducible"):
+            # one reason may stand behind several rows
+            for why in dict.fromkeys(row.why for row in done.rows if row.verdict == verdict):
+                places = "; ".join(
+                    dict.fromkeys(row.place for row in done.rows if (row.verdict, row.why) == (verdict, why))
+                )
+                say(
+                    f"  {MARKS[verdict]} {places}: {why}",
+                    fg=typer.colors.RED if verdict in ("error", "differs") else None,
+                )
     rows = [[done.name, *(str(done.counts[key]) for key in results.counts)] for done in results.papers]
     total = ["all", *(str(count) for count in results.counts.values())]
     typer.echo("")
@@ -78,16 +94,12 @@ def _print(results: Results) -> None:
 def _cells(row: Row) -> list[str]:
     printed, here = row.printed, row.ours_text
     if row.tolerance is not None:
-        printed += f" (off by {_off(row.printed_off)})"
-        here = (
-            f"{row.correct} (off by {_off(row.ours_off)})".strip()
-            if row.verdict == "corrected"
-            else f"off by {_off(row.ours_off)}"
-        )
+        right = f"{row.correct}, " if row.verdict == "corrected" and row.correct else ""
+        printed, here = f"{printed}, {_off(row.printed_off, row.unit)}", f"{right}{_off(row.ours_off, row.unit)}"
     elif row.unit:
         printed, here = (f"{text} {row.unit}" if text else "" for text in (printed, here))
-    return [row.place, f"{row.what}: {row.why}" if row.why else row.what, printed, here, row.verdict.value]
+    return [MARKS[row.verdict.value], row.place, row.what, printed, here]
 
 
-def _off(value: float | None) -> str:
-    return "undefined" if value is None else f"{value:.2g}"
+def _off(value: float | None, unit: str) -> str:
+    return "undefined" if value is None else f"off by {value:.2g} {unit}".rstrip() if value else "exact"

@@ -36,7 +36,7 @@ class Off(NamedTuple):
 
 
 #: relative slack of a comparison with a printed number: rounding of ours
-ROUNDING = 1e-9
+ROUNDING = 1e-12
 _NUMBER = re.compile(r"(?P<relation>[<>])?\s*(?P<value>-?\d+(?:\.(?P<decimals>\d*))?)(?:/(?P<under>\d+))?")
 
 

@@ -50,9 +50,7 @@ def unit_text(unit: str) -> str:
 
 def with_unit(text: str, unit: str) -> str:
     """A printed or computed number and its unit as HTML; "°" without a space."""
-    number, _, power = text.partition("e")
-    shown = f"{number}×10<sup>{int(power)}</sup>" if power else number
-    shown = shown.replace("-", "−")
+    shown = re.sub(r"(?<=\d)e([+-]\d+)$", lambda m: f"×10<sup>{int(m[1])}</sup>", text).replace("-", "−")
     if not unit:
         return shown
     return f"{shown}°" if unit == "deg" else f"{shown}\u00a0{unit_text(unit)}"
