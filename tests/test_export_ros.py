@@ -17,7 +17,8 @@ from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
 import bodyplan as bp
-from bodyplan.export import joint_trajectory, mcap_file
+from bodyplan.export import joint_trajectory
+from bodyplan.export.messages import definition
 from bodyplan.export.ros import nanoseconds
 from bodyplan.export.sampled import between, sampled
 from export_cases import CASES, small, world_matrices
@@ -102,16 +103,17 @@ def test_the_log_is_one_of_ros_2(tmp_path: Path) -> None:
         assert {s.encoding for s in names.values()} == {"ros2msg"}
         assert {c.message_encoding for c in summary.channels.values()} == {"cdr"}
         assert [m.metadata for m in reader.iter_metadata()] == [{"robot": "silo4", "gait": "crawl"}]
-    for name, text in (
-        ("sensor_msgs/msg/JointState", mcap_file.JOINT_STATE),
-        ("tf2_msgs/msg/TFMessage", mcap_file.TF_MESSAGE),
-    ):
+    kinds = ("sensor_msgs/JointState", "tf2_msgs/TFMessage", "visualization_msgs/MarkerArray")
+    assert set(names) == {kind.replace("/", "/msg/") for kind in kinds}
+    for kind in kinds:
+        name, text = kind.replace("/", "/msg/"), definition(kind)
         assert names[name].data.decode() == text
         # field by field what ROS 2 says, for the message and all that it is made of
         types = get_types_from_msg(text, name)
         assert len(types) >= 3
         for part, (_, fields) in types.items():
-            assert fields == STORE.fielddefs[part][1]
+            for store in (STORE, get_typestore(Stores.ROS2_JAZZY)):
+                assert fields == store.fielddefs[part][1]
 
 
 def test_stamps_may_start_elsewhere_and_the_world_have_another_name(tmp_path: Path) -> None:

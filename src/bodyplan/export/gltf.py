@@ -16,36 +16,20 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.errors import InputError
 from bodyplan.export import meshes
+from bodyplan.export.drawing import COLORS, along, arcs_of, bar_radius, bend_of, ground_meshes, links
 from bodyplan.export.glb import Glb
 from bodyplan.files import replacing
-from bodyplan.ground.base import Ground, Solid
 from bodyplan.motion import Motion
-from bodyplan.robot.batch import variable
 from bodyplan.robot.elements import Arc, Contact
-from bodyplan.show.scene import AXLE
-from bodyplan.show.shapes import arc_bones, bones, extent, scenery, thickness
-from bodyplan.spatial.poses import relative
-from bodyplan.spatial.rotations import left_jacobian, multiply, quaternion_exp, rotate
+from bodyplan.show.shapes import thickness
+from bodyplan.spatial.rotations import multiply, quaternion_exp, rotate
 
 #: z up -> y up: a quarter turn about x, wxyz
 Y_UP = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)
 #: stiff pieces that an arc is drawn with
 PIECES = 8
-#: ground around the robot's way, of the size of both
-MARGIN = 0.2
 #: most samples along a side of a height field
 MOST_SIDE = 200
-#: red, green, blue (linear), opacity
-COLORS = {
-    "capsule": (0.05, 0.24, 0.36, 1.0),
-    "box": (0.05, 0.24, 0.36, 1.0),
-    "sphere": (0.72, 0.24, 0.06, 1.0),
-    "rim": (0.03, 0.03, 0.035, 1.0),
-    "link": (0.33, 0.36, 0.4, 1.0),
-    "floor": (0.5, 0.47, 0.42, 1.0),
-    "wall": (0.55, 0.55, 0.58, 1.0),
-    "ceiling": (0.6, 0.66, 0.75, 0.35),
-}
 
 
 def write(motion: Motion, path: str | os.PathLike[str], *, ground: str = "yes") -> None:
@@ -84,8 +68,11 @@ class _Scene:
         for contact in self.robot.contacts:
             self._contact(contact)
         self._links()
+        for arc, before, after, radius in arcs_of(self.robot):
+            self._arc(arc, before, after, radius or self.thin)
         if ground:
-            self._ground(motion.ground)
+            for role, mesh in ground_meshes(motion, self.poses, MOST_SIDE).items():
+                self.glb.node(f"ground ({role})", self.world, mesh=self._stored("ground", role, mesh))
 
     def pack(self) -> bytes:
         return self.glb.pack()
@@ -107,85 +94,44 @@ class _Scene:
             self.glb.node(name, frame, mesh=mesh, translation=contact.start)
         else:
             self.glb.node(name, frame, mesh=mesh)
-        away = float(np.linalg.norm(contact.start))
-        if contact.shape == "sphere" and away > 2.0 * contact.radius:
-            # a ball beside its frame, as a foot is, would hang in the air
-            radius = AXLE * contact.radius
+        radius = bar_radius(contact)
+        if radius is not None:
             made = partial(meshes.capsule, (0.0, 0.0, 0.0), contact.start, radius)
             bar = self._mesh(("bar", radius, contact.start), "link", made)
             self.glb.node(f"{contact.name} (bar)", frame, mesh=bar)
 
     def _links(self) -> None:
-        """Lines between frames that no capsule hides, and arcs."""
-        arcs = arc_bones(self.robot)
-        for before, after in bones(self.robot):
-            if (before, after) in arcs:
-                element = self.robot.elements[after - 1]
-                assert isinstance(element, Arc)
-                self._arc(element, before, after, arcs[before, after][1] or self.thin)
-                continue
-            name = f"{self.robot.frames[after]} (link)"
-            seen = relative(self.poses[:, after], self.poses[:, before])[:, :3]
-            longest = float(np.linalg.norm(seen, axis=1).max())
-            if longest <= 1e-6 * self.size:
-                continue
-            if np.ptp(seen, axis=0).max() <= 1e-9 * self.size:
-                made = partial(meshes.capsule, seen[0], np.zeros(3), self.thin)
-                mesh = self._mesh(("bone", *np.round(seen[0], 12)), "link", made)
-                self.glb.node(name, self.frames[after], mesh=mesh)
+        for link in links(self.robot, self.poses):
+            name, frame = f"{self.robot.frames[link.after]} (link)", self.frames[link.after]
+            if link.stiff:
+                at = link.seen[0]
+                made = partial(meshes.capsule, at, np.zeros(3), self.thin)
+                self.glb.node(name, frame, mesh=self._mesh(("bone", *np.round(at, 12)), "link", made))
                 continue
             # one that grows, or turns against the frame it ends in
-            length = np.linalg.norm(seen, axis=1)
+            length = np.linalg.norm(link.seen, axis=1)
             scale = np.stack([length, np.ones_like(length), np.ones_like(length)], axis=-1)
             mesh = self._mesh(("rod",), "link", partial(meshes.rod, self.thin))
-            turn = meshes.turning(np.array([1.0, 0.0, 0.0]), seen)
-            self._moving(name, self.frames[after], np.zeros_like(seen), turn, scale, mesh)
+            turn = meshes.turning(np.array([1.0, 0.0, 0.0]), link.seen)
+            self._moving(name, frame, np.zeros_like(link.seen), turn, scale, mesh)
 
     def _arc(self, arc: Arc, before: int, after: int, radius: float) -> None:
         """Short capsules along an arc, each where the middle of its piece is."""
-        column = {name: i for i, name in enumerate(self.robot.joints)}
-        pitch, yaw = (variable(v, self.motion.q, column) for v in (arc.pitch, arc.yaw))
-        bend = np.stack([np.zeros_like(pitch), pitch, yaw], axis=-1)
+        bend = bend_of(arc, self.motion)
         start, half = self.poses[:, before], 0.5 * arc.length / PIECES
         made = partial(meshes.capsule, (-half, 0.0, 0.0), (half, 0.0, 0.0), radius)
         mesh = self._mesh(("arc", half, radius), "capsule", made)
         for k in range(PIECES):
-            turned = (k + 0.5) / PIECES * bend
-            ahead = (k + 0.5) / PIECES * arc.length * left_jacobian(turned)[..., 0]
-            position = start[:, :3] + rotate(start[:, 3:], ahead)
+            share = (k + 0.5) / PIECES
+            position = start[:, :3] + rotate(start[:, 3:], along(arc, bend, share))
+            turned = multiply(start[:, 3:], quaternion_exp(share * bend))
             name = f"{self.robot.frames[after]} (arc {k + 1})"
-            self._moving(name, self.world, position, multiply(start[:, 3:], quaternion_exp(turned)), mesh=mesh)
-
-    @cached_property
-    def size(self) -> float:
-        """Of the robot, m."""
-        return float(np.linalg.norm(np.ptp(self.poses[0, :, :3], axis=0))) or 0.1
+            self._moving(name, self.world, position, turned, mesh=mesh)
 
     @cached_property
     def thin(self) -> float:
         """Radius of links that have none, m."""
         return thickness(self.robot, self.poses)
-
-    # --- ground ---------------------------------------------------------------------------------------------
-
-    def _ground(self, ground: Ground) -> None:
-        low, high = extent([self.poses], self.robot)
-        margin = MARGIN * float(np.linalg.norm(high - low)) * np.array([1.0, 1.0, 0.0])
-        low, high = low - margin, high + margin
-        found = scenery(ground, low, high)
-        # scenery's fields are for small pictures
-        fields = [solid for solid in ground.solids(low, high) if solid.kind == "field"]
-        parts: dict[str, list[meshes.Mesh]] = {}
-        for corners in found.planes:
-            up = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-            parts.setdefault("floor", []).append(meshes.polygon(corners, up / np.linalg.norm(up)))
-        for face in found.faces:
-            parts.setdefault(face.role, []).append(meshes.polygon(face.corners, face.normal))
-        for solid in fields:
-            parts.setdefault(solid.role, []).append(_field(solid))
-        for role, pieces in parts.items():
-            mesh = self._mesh(("ground", role), role, partial(meshes.joined, pieces))
-            self.glb.node(f"ground ({role})", self.world, mesh=mesh)
 
     # --- pieces ---------------------------------------------------------------------------------------------
 
@@ -212,18 +158,10 @@ class _Scene:
     def _mesh(self, key: tuple[object, ...], color: str, make: Callable[[], meshes.Mesh]) -> int:
         """A mesh, made once for all that look the same."""
         if key not in self._meshes:
-            if color not in self._materials:
-                self._materials[color] = self.glb.material(color, COLORS[color])
-            made = make()
-            self._meshes[key] = self.glb.mesh(
-                str(key[0]), made.vertices, made.normals, made.faces, self._materials[color]
-            )
+            self._meshes[key] = self._stored(str(key[0]), color, make())
         return self._meshes[key]
 
-
-def _field(solid: Solid) -> meshes.Mesh:
-    """A height field, thinned out where it is finer than a picture needs."""
-    assert solid.z is not None
-    rows, columns = (np.unique(np.linspace(0, n - 1, min(n, MOST_SIDE)).round().astype(int)) for n in solid.z.shape)
-    x, y = solid.position[0] + columns * solid.cell[0], solid.position[1] + rows * solid.cell[1]
-    return meshes.field(x, y, np.asarray(solid.z[np.ix_(rows, columns)]))
+    def _stored(self, name: str, color: str, mesh: meshes.Mesh) -> int:
+        if color not in self._materials:
+            self._materials[color] = self.glb.material(color, COLORS[color])
+        return self.glb.mesh(name, mesh.vertices, mesh.normals, mesh.faces, self._materials[color])

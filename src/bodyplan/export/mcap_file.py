@@ -1,7 +1,8 @@
 """Motion as an MCAP log of ROS 2 messages: what Foxglove and RViz play, ``ros2 bag`` and other tools read.
 
 /joint_states has a sensor_msgs/msg/JointState a sample; /tf a tf2_msgs/msg/TFMessage with the tree of frames: the
-fixed frame, the base in it, every chain's frames one in the other, as robot_state_publisher would.
+fixed frame, the base in it, every chain's frames one in the other, as robot_state_publisher would. Markers draw robot
+and ground on them: /markers/robot (again every second, for who comes late), /markers/moving, /markers/ground.
 """
 
 from __future__ import annotations
@@ -13,63 +14,31 @@ import numpy as np
 
 from bodyplan.arrays import Array, number
 from bodyplan.errors import InputError, MissingExtraError
+from bodyplan.export.markers import Markers, stamped
+from bodyplan.export.messages import definition
 from bodyplan.export.ros import MOST_SECONDS, NANO, nanoseconds, split
 from bodyplan.files import replacing
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
 from bodyplan.spatial.poses import relative
 
-_LINE = "=" * 80
-_HEADER = f"""\
-{_LINE}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{_LINE}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
-JOINT_STATE = f"""\
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-{_HEADER}"""
-TF_MESSAGE = f"""\
-geometry_msgs/TransformStamped[] transforms
-{_LINE}
-MSG: geometry_msgs/TransformStamped
-std_msgs/Header header
-string child_frame_id
-geometry_msgs/Transform transform
-{_LINE}
-MSG: geometry_msgs/Transform
-geometry_msgs/Vector3 translation
-geometry_msgs/Quaternion rotation
-{_LINE}
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-{_LINE}
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-{_HEADER}"""
+#: most pictures a second of what changes its shape
+PICTURES = 30
 
 
 def write(
-    motion: Motion, path: str | os.PathLike[str], *, fixed_frame: str = "world", start: float | None = None
+    motion: Motion,
+    path: str | os.PathLike[str],
+    *,
+    fixed_frame: str = "world",
+    start: float | None = None,
+    markers: str = "yes",
 ) -> None:
     """Write the motion to ``path``; efforts are its torques where it has any.
 
     ``fixed_frame``: name of the world's frame. ``start``: stamp of the first sample in s (Unix time where the log is
-    to look like one of today); the motion's own times where None. Raises InputError, MissingExtraError without the
-    extra "ros".
+    to look like one of today); the motion's own times where None. ``markers``: "no" leaves them out. Raises InputError,
+    MissingExtraError without the extra "ros".
     """
     try:
         from mcap_ros2.writer import Writer
@@ -79,33 +48,66 @@ def write(
     robot = motion.robot
     if not isinstance(fixed_frame, str) or not fixed_frame or fixed_frame in robot.frames:
         raise InputError(f"fixed_frame: must be a name that is no frame of the robot, got {fixed_frame!r}.")
+    if markers not in ("yes", "no"):
+        raise InputError(f"markers: must be yes or no, got {markers!r}.")
+    stamps = _stamps(motion, start)
+    names = [fixed_frame, *robot.frames]
+    parents = tree(robot)
+    arms = transforms(motion, parents).tolist()
+    efforts = [[]] * len(motion.t) if motion.torques is None else motion.torques.tolist()
+    drawn = Markers(motion, fixed_frame) if markers == "yes" else None
+    with replacing(path, "wb") as file, Writer(file) as writer:
+        log = _Log(writer)
+        writer.add_metadata("bodyplan", {"robot": robot.name, "gait": str(motion.gait.get("kind", ""))})
+        due = {"robot": stamps[0], "moving": stamps[0]}
+        rows = zip(stamps, motion.q.tolist(), motion.qd.tolist(), efforts, arms, strict=True)
+        for k, (at, q, qd, effort, poses) in enumerate(rows):
+            stamp = dict(zip(("sec", "nanosec"), split(at), strict=True))
+            state = {"name": robot.joints, "position": q, "velocity": qd, "effort": effort}
+            log.write("/joint_states", "sensor_msgs/JointState", {"header": _header(stamp, "")} | state, at)
+            arm = [_transform(stamp, names[parents[i] + 1], names[i + 1], pose) for i, pose in enumerate(poses)]
+            log.write("/tf", "tf2_msgs/TFMessage", {"transforms": arm}, at)
+            if drawn is None:
+                continue
+            if k == 0:
+                log.draw("/markers/ground", drawn.ground, stamp, at)
+            if at >= due["robot"]:
+                log.draw("/markers/robot", drawn.still, stamp, at)
+                due["robot"] = at + NANO
+            if at >= due["moving"] or k == len(stamps) - 1:
+                log.draw("/markers/moving", drawn.moving(k), stamp, at)
+                due["moving"] = at + NANO // PICTURES
+
+
+class _Log:
+    """A log being written; counts the messages of every topic."""
+
+    def __init__(self, writer: Any) -> None:
+        self._writer, self._schemas, self._counts = writer, dict[str, Any](), dict[str, int]()
+
+    def write(self, topic: str, kind: str, message: dict[str, Any], at: int) -> None:
+        if kind not in self._schemas:
+            self._schemas[kind] = self._writer.register_msgdef(kind.replace("/", "/msg/"), definition(kind))
+        count = self._counts.get(topic, 0)
+        self._writer.write_message(topic, self._schemas[kind], message, at, at, count)
+        self._counts[topic] = count + 1
+
+    def draw(self, topic: str, markers: list[dict[str, Any]], stamp: dict[str, int], at: int) -> None:
+        if markers:
+            self.write(topic, "visualization_msgs/MarkerArray", {"markers": stamped(markers, stamp)}, at)
+
+
+def _stamps(motion: Motion, start: float | None) -> list[int]:
+    """Nanoseconds of every sample, from ``start`` s on where given."""
     stamps = nanoseconds(motion.t)
     if start is not None:
-        first = nanoseconds(np.array([number(start, "start", at_least=0.0)]))[0]
-        stamps = stamps - stamps[0] + first
+        stamps = stamps - stamps[0] + nanoseconds(np.array([number(start, "start", at_least=0.0)]))[0]
     if stamps[-1] >= MOST_SECONDS * NANO:
         raise InputError(f"start: ROS 2 counts to {MOST_SECONDS - 1} s, the log would go past that.")
     if stamps[0] < 0:
         raise InputError(f"Motion.t: an MCAP log has no times before 0, got {motion.t[0]!r}; give a start.")
-    parents = tree(robot)
-    names = [fixed_frame, *robot.frames]
-    arms = transforms(motion, parents).tolist()
-    efforts = [[]] * len(motion.t) if motion.torques is None else motion.torques.tolist()
-    with replacing(path, "wb") as file, Writer(file) as log:
-        states = log.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
-        tf = log.register_msgdef("tf2_msgs/msg/TFMessage", TF_MESSAGE)
-        log.add_metadata("bodyplan", {"robot": robot.name, "gait": str(motion.gait.get("kind", ""))})
-        rows = zip(stamps.tolist(), motion.q.tolist(), motion.qd.tolist(), efforts, arms, strict=True)
-        for k, (stamp, q, qd, effort, poses) in enumerate(rows):
-            sec, nanosec = split(stamp)
-            header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": ""}
-            state = {"header": header, "name": robot.joints, "position": q, "velocity": qd, "effort": effort}
-            log.write_message("/joint_states", states, state, stamp, stamp, k)
-            arm = [
-                _transform(header | {"frame_id": names[parents[i] + 1]}, names[i + 1], pose)
-                for i, pose in enumerate(poses)
-            ]
-            log.write_message("/tf", tf, {"transforms": arm}, stamp, stamp, k)
+    out: list[int] = stamps.tolist()
+    return out
 
 
 def tree(robot: Robot) -> list[int]:
@@ -127,10 +129,14 @@ def transforms(motion: Motion, parents: list[int]) -> Array:
     return out
 
 
-def _transform(header: dict[str, Any], child: str, pose: list[float]) -> dict[str, Any]:
+def _header(stamp: dict[str, int], frame: str) -> dict[str, Any]:
+    return {"stamp": stamp, "frame_id": frame}
+
+
+def _transform(stamp: dict[str, int], parent: str, child: str, pose: list[float]) -> dict[str, Any]:
     x, y, z, qw, qx, qy, qz = pose
     return {
-        "header": header,
+        "header": _header(stamp, parent),
         "child_frame_id": child,
         "transform": {"translation": {"x": x, "y": y, "z": z}, "rotation": {"x": qx, "y": qy, "z": qz, "w": qw}},
     }
