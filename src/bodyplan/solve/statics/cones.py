@@ -8,6 +8,8 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 
+#: share of the largest force that is none
+ROUNDING = 1e-12
 #: what a contact may do: nothing, push along one direction, push within a cone
 NOTHING, RAY, CONE = 0, 1, 2
 
@@ -66,9 +68,10 @@ class Cones:
 
 
 def ratios(x: Array) -> Array:
-    """(..., k): tangential over normal force of components x (..., k, 3); 0 without force, inf without or against a
-    normal force."""
+    """(..., k): tangential over normal force of components x (..., k, 3); 0 where a force is rounding of the largest
+    one, inf without or against a normal force."""
     r, n = np.hypot(x[..., 1], x[..., 2]), x[..., 0]
-    pushes = n > 0.0
-    some = (r > 0.0) | (n < 0.0)
+    size = np.hypot(r, n)
+    some = size > ROUNDING * size.max(axis=-1, keepdims=True, initial=0.0)
+    pushes = some & (n > 0.0)
     return np.where(pushes, r / np.where(pushes, n, 1.0), np.where(some, np.inf, 0.0))

@@ -66,7 +66,7 @@ class Loads:
         turned = np.cross(self.arms[..., :, None, :], np.swapaxes(self.frames, -1, -2))
         rows = np.concatenate([self.frames, np.swapaxes(turned, -1, -2)], axis=-2)
         rows = np.where(self.touching[..., None, None], rows, 0.0)
-        return np.moveaxis(rows, 1, 2).reshape(self.count, 6, -1)
+        return np.moveaxis(rows, 1, 2).reshape(self.count, 6, 3 * self.contacts)
 
     def newtons(self, x: Array) -> Array:
         """(n, k, 3) N in the world, of components (n, k, 3)."""
@@ -83,7 +83,7 @@ class Loads:
 
     def left_over(self, x: Array) -> Array:
         """(n,): the largest entry of force and moment that components (n, k, 3) leave over, as a share of the load."""
-        rest = np.einsum("nij,nj->ni", self.equations(), x.reshape(self.count, -1)) + self.load
+        rest = np.einsum("nij,nj->ni", self.equations(), x.reshape(self.count, 3 * self.contacts)) + self.load
         return np.asarray(np.abs(rest).max(axis=-1))
 
     @staticmethod

@@ -116,9 +116,12 @@ def smallest_free(loads: Loads, mu: Array) -> Array:
     x = -(inverse @ loads.load[..., None])[..., 0].reshape(loads.count, loads.contacts, 3)
     kind = np.where(loads.touching, np.where(mu > 0.0, CONE, RAY), 0)
     ray = np.broadcast_to([1.0, 0.0, 0.0], x.shape)
-    inside = Cones(kind, mu, ray).outside(x).max(axis=1) <= 1e-14 * np.abs(x).max(axis=(1, 2))
+    rounding = 1e-14 * np.abs(x).max(axis=(1, 2))
+    x[np.abs(x).max(axis=2) <= rounding[:, None]] = 0.0
+    inside = Cones(kind, mu, ray).outside(x).max(axis=1) <= rounding
     inside &= loads.left_over(x) <= ROUNDING
     x[~loads.touching] = 0.0
+    x[kind == RAY, 1:] = 0.0
     x[~inside] = np.nan
     x[loads.force == 0.0] = 0.0
     return np.asarray(x)

@@ -85,7 +85,8 @@ def torque_interval(
             gain = np.einsum("kij,ki->kj", loads.frames[i], arms[i, j])
             for side, sign in enumerate((-1.0, 1.0)):
                 value, forces, fine = _end(equal, solved.cones, sign * gain, solved.x)
-                ends[side, i, j], x[side, i, j] = sign * value * max(loads.force[i], 0.0), forces
+                x[side, i, j] = forces
+                ends[side, i, j] = sign * (value * loads.force[i] if np.isfinite(value) else value)
                 if not fine:
                     status[i] = Status.NOT_CONVERGED.value
                     reasons[i] = f"the interval of torque {j} could not be proved"
