@@ -186,7 +186,7 @@ def test_no_cluster_no_workers_another_version(tmp_path, monkeypatch, processes)
     monkeypatch.setattr(cluster, "PATIENCE", 60.0)
     monkeypatch.setattr(cluster, "__version__", "99.0")
     with pytest.raises(bp.BodyplanError, match=r"a worker runs bodyplan .*, this process 99\.0"):
-        bp.sweep(mission(), {"gait.omega": [1.1, 1.2]}, tmp_path / "s", scheduler=address)
+        bp.sweep(mission(), {"gait.omega": [1.1, 1.2]}, tmp_path / "t", scheduler=address)
 
 
 def test_two_writers_are_refused(tmp_path):

@@ -57,7 +57,7 @@ def _row(payload: Payload, overrides: tuple[str, ...], simulate: bool) -> Row:
         figures |= {f"plan.{name}": _finite(value) for name, value in motion.facts.items()}
         if not motion.ok:
             first = int(np.flatnonzero(motion.status != "ok")[0])
-            why = "".join(f"; {note}" for note in motion.notes[:3])
+            why = "".join(f"; {note}" for note in motion.notes[-1:])  # planners put what failed last
             return Row(str(motion.status[first]), f"the plan, at t = {motion.t[first]:.4g} s{why}", figures)
         figures["check.passed"] = float(sum(line.passed is True for line in report))
         figures["check.failed"] = float(len(report.failures))
