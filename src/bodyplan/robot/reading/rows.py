@@ -1,9 +1,9 @@
 """Any transform, and any turn about or slide along an axis, as rows of the extended D-H table.
 
-Between two lines in space a row ``Rz(theta) Tz(d) Tx(a) Rx(epsilon)`` leads from one to the other along their common
-normal; what is left is a turn about the second line and a shift along it, ``Rz(t) Tz(s)``. These commute with a joint
-on that line and merge with the row that comes next. Lines that are nearly parallel have a common normal far away, which
-would cost digits: there a row shifts and a second one turns.
+A row ``Rz(theta) Tz(d) Tx(a) Rx(epsilon)`` turns and shifts; what is left after one or two of them is a turn about the
+new z axis, ``Rz(t)``, which commutes with a joint on that axis and merges with the row that comes next. The origin of
+the frame before a joint is the place that the model gives the joint, not the foot of a common normal, which may be far
+away.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.robot.elements import Body, Joint, Row, Variable
 
-#: sine of the angle of two lines from which on their common normal is near enough; and what counts as none
-STEEP, NONE = 0.1, 1e-15
+#: what counts as rounding, m or the sine of an angle
+NONE = 1e-15
 
 
 @dataclass(frozen=True)
@@ -67,24 +67,22 @@ def along(amount: float, turns: bool) -> Array:
 
 def decompose(transform: Array) -> tuple[list[Constant], float, float]:
     """(rows, t, s) with ``transform`` (4, 4) = rows Rz(t) Tz(s): at most two rows, none where z stays on its line."""
-    R, (x, y, z) = transform[:3, :3], transform[:3, 3]
-    across, along = math.hypot(R[0, 2], R[1, 2]), math.hypot(x, y)
-    if across < NONE and R[2, 2] > 0.0 and along < NONE:
+    R, (x, y, z) = transform[:3, :3], transform[:3, 3].tolist()
+    across = math.hypot(R[0, 2], R[1, 2])
+    if across < NONE and R[2, 2] > 0.0 and math.hypot(x, y) < NONE:
         return [], _tidy(math.atan2(R[1, 0], R[0, 0])), _tidy(z)
     if across < NONE:
         return _parallel(R, x, y, z)
     # Rz(theta) Rx(epsilon) takes z to (sin(theta) sin(epsilon), -cos(theta) sin(epsilon), cos(epsilon))
     sine = -across if R[1, 2] > 0.0 else across
     theta, epsilon = math.atan2(R[0, 2] / sine, -R[1, 2] / sine), math.atan2(sine, R[2, 2])
-    if along >= NONE and across < STEEP:
-        ahead, length = _ahead(x, y)
-        rest = theta - ahead
-        rows = [_row(ahead, z, length, 0.0), _row(rest, 0.0, 0.0, epsilon)]
-        return rows, _rest(R, theta, epsilon), 0.0
     cosine, height = math.cos(theta), math.sin(theta)
-    shift = -(y * cosine - x * height) / sine if along >= NONE else 0.0
-    row = _row(theta, z - shift * R[2, 2], x * cosine + y * height, epsilon)
-    return [row], _rest(R, theta, epsilon), _tidy(shift)
+    aside = y * cosine - x * height
+    if abs(aside) < NONE:
+        return [_row(theta, z, x * cosine + y * height, epsilon)], _rest(R, theta, epsilon), 0.0
+    ahead, length = _ahead(x, y)
+    rows = [_row(ahead, z, length, 0.0), _row(theta - ahead, 0.0, 0.0, epsilon)]
+    return rows, _rest(R, theta, epsilon), 0.0
 
 
 def _parallel(R: Array, x: float, y: float, z: float) -> tuple[list[Constant], float, float]:
