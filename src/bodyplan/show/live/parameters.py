@@ -60,7 +60,7 @@ LESS, MORE, STEPS, WHOLE = 0.25, 2.0, 200, 6
 #: longest list whose numbers are shown, most numbers shown in all
 MOST_ELEMENTS, MOST = 6, 24
 #: halvings with which the end of what a gait allows is found
-HALVINGS = 12
+HALVINGS = 40
 #: a text that no gait knows, to be told what it knows
 NOTHING = "?"
 
@@ -215,14 +215,15 @@ def _label(key: Key, unit: str) -> str:
 
 
 def _whole(key: Key, value: int, allowed: Callable[[float | int], bool]) -> Parameter | None:
-    low = high = value
-    while value - low < WHOLE and allowed(low - 1):
-        low -= 1
-    while high - value < max(WHOLE, value) and allowed(high + 1):
-        high += 1
-    if low == high:
-        return None
-    return Parameter(key, _label(key, ""), "", 1.0, value, low, high, 1, whole=True)
+    for step in (1, 2):  # some gaits take even numbers only
+        low = high = value
+        while value - low < step * WHOLE and allowed(low - step):
+            low -= step
+        while high - value < max(step * WHOLE, value) and allowed(high + step):
+            high += step
+        if low < high:
+            return Parameter(key, _label(key, ""), "", 1.0, value, low, high, step, whole=True)
+    return None
 
 
 def _real(
@@ -243,6 +244,9 @@ def _real(
         shown + step * math.trunc((end - shown) / step + 1e-9 * (1 if end > shown else -1)) for end in (low, high)
     )
     low, high = (_rounded(end, 0.1 * step) for end in (low, high))
+    # an end that belongs to what is refused
+    low = low if allowed(low * size) else _rounded(low + step, 0.1 * step)
+    high = high if allowed(high * size) else _rounded(high - step, 0.1 * step)
     if not (low < high and allowed(low * size) and allowed(high * size)):
         return None
     return Parameter(key, _label(key, unit), unit, size, shown, low, high, step)

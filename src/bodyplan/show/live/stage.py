@@ -204,7 +204,7 @@ class Stage:
                 if then is not None:
                     trial.draw(then)
             apart = self._beside if shown.beside and then is not None else 0.0
-            self._handles["trial"].position = (0.0, -apart, 0.0)
+            self._handles["trial"].position = (0.0, apart, 0.0)
             for name, handles in self._roles.items():
                 side, role = name.split(" ")
                 for handle in handles:
