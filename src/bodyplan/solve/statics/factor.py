@@ -18,7 +18,7 @@ MODERATE = 1e2
 #: forces beyond this many times the load: squeezing that the least friction needs without bound
 SQUEEZED = 1e5
 #: how near forces of that size come to the least friction
-NEAR = 1e-3
+NEAR = 5e-3
 #: coefficients beyond this are no friction
 MOST = 1e8
 #: residual of the conditions of optimality up to which a solution is one

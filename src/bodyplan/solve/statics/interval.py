@@ -15,7 +15,7 @@ from bodyplan.solve.statics.conic import least
 from bodyplan.solve.statics.equilibrium import Balance, Loads, balance, friction
 from bodyplan.solve.statics.item import on_faces, solve_item
 from bodyplan.solve.statics.outcome import Outcome, shaped
-from bodyplan.solve.statics.polish import polish
+from bodyplan.solve.statics.polish import polish_gain
 
 #: residual of the conditions of optimality up to which an end of an interval counts
 CLOSE = 1e-9
@@ -120,5 +120,5 @@ def _end(held: Balance, cones: Cones, gain: Array, x: Array) -> tuple[float, Arr
         return np.inf, np.full((k, 3), np.nan), True
     if found.status == "infeasible":
         return np.nan, x, False
-    done = polish(A, b, cones, 0.0, aim, found.x, found.y)
+    done = polish_gain(A, b, cones, aim, found.x, found.y)
     return float(push @ done.x.ravel()), done.x, done.residual <= CLOSE

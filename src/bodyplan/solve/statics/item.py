@@ -12,7 +12,7 @@ from bodyplan.solve.statics.cones import CONE, RAY, Cones
 from bodyplan.solve.statics.conic import least
 from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, balance
 from bodyplan.solve.statics.factor import PROVED, Factor, Family, faces, holds_with_any_friction, least_factor
-from bodyplan.solve.statics.polish import WARM, polish
+from bodyplan.solve.statics.polish import WARM, polish_norm
 
 #: share by which friction may be short of what is needed, or more than it
 SHORT = 1e-12
@@ -40,16 +40,14 @@ class Solved(NamedTuple):
 def smallest(held: Balance, cones: Cones, start: Array | None = None) -> tuple[Array, Array] | None:
     """(x, y) of the smallest norm, exact; None where there is none or it cannot be proved."""
     A, b = held.A, held.b
-    k = len(cones.kind)
-    gain = np.zeros((k, 3))
     if start is not None:
-        done = polish(A, b, cones, 1.0, gain, cones.nearest((A.T @ start).reshape(k, 3))[0], start, WARM)
+        done = polish_norm(A, b, cones, start, WARM)
         if done.residual <= PROVED:
             return done.x, done.y
-    found = least(A, b, cones, 1.0, gain)
+    found = least(A, b, cones, 1.0, np.zeros((len(cones.kind), 3)))
     if found.status == "infeasible" or not np.all(np.isfinite(found.x)):
         return None
-    done = polish(A, b, cones, 1.0, gain, found.x, found.y)
+    done = polish_norm(A, b, cones, found.y)
     return (done.x, done.y) if done.residual <= PROVED else None
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -35,30 +36,40 @@ class PolishedRatio(NamedTuple):
     residual: float
 
 
-def polish(
-    A: Array, b: Array, cones: Cones, square: float, gain: Array, x: Array, y: Array, steps: int = STEPS
-) -> Polished:
-    """x with A x = b, x the nearest in its cones to x - (square x - gain - A^T y): then it minimises square |x|^2 / 2 -
-    gain . x, since the cones are convex. The nearest point is piecewise smooth, so that Newton's method converges at
-    once from near the solution (Qi and Sun 1993)."""
+def polish_norm(A: Array, b: Array, cones: Cones, y: Array, steps: int = STEPS) -> Polished:
+    """The x of the smallest norm in its cones with A x = b: the nearest in them to A^T y, for the y with which it meets
+    the equations (a concave problem in y, smooth but for kinks of its second derivative)."""
+    k, r = len(cones.kind), len(b)
+    by_contact = A.reshape(r, k, 3)
+
+    def system(y: Array) -> tuple[Array, Array, Array]:
+        near, D, _ = cones.nearest((A.T @ y).reshape(k, 3))
+        moved = np.einsum("rki,kij->rkj", by_contact, D).reshape(r, 3 * k)
+        return A @ near.ravel() - b, moved @ A.T, near
+
+    y, residual = _newton(system, y, steps)
+    near = system(y)[2] if np.isfinite(residual) else np.zeros((k, 3))
+    return Polished(near, y, residual / max(1.0, float(np.abs(near).max(initial=0.0))))
+
+
+def polish_gain(A: Array, b: Array, cones: Cones, gain: Array, x: Array, y: Array) -> Polished:
+    """The x in its cones with A x = b and the largest gain . x: the nearest in them to x + gain + A^T y with some y."""
     k, r = len(cones.kind), len(b)
     size = 3 * k
 
     def system(u: Array) -> tuple[Array, Array, Array]:
-        z = (1.0 - square) * u[:size] + gain.ravel() + A.T @ u[size:]
-        near, D, _ = cones.nearest(z.reshape(k, 3))
+        near, D, _ = cones.nearest((u[:size] + gain.ravel() + A.T @ u[size:]).reshape(k, 3))
         full = _blocks(D)
         jacobian = np.zeros((size + r, size + r))
-        jacobian[:size, :size] = np.eye(size) - (1.0 - square) * full
+        jacobian[:size, :size] = np.eye(size) - full
         jacobian[:size, size:] = -full @ A.T
         jacobian[size:, :size] = A
         return np.concatenate([u[:size] - near.ravel(), A @ u[:size] - b]), jacobian, near
 
-    u, residual = _newton(system, np.concatenate([x.ravel(), y]), steps)
-    near = system(u)[2]
+    u, residual = _newton(system, np.concatenate([x.ravel(), y]), STEPS)
+    near = system(u)[2] if np.isfinite(residual) else x
     missed = float(np.abs(A @ near.ravel() - b).max(initial=0.0))
-    scale = max(1.0, float(np.abs(near).max(initial=0.0)))
-    return Polished(near, u[size:], max(residual, missed) / scale)
+    return Polished(near, u[size:], max(residual, missed) / max(1.0, float(np.abs(near).max(initial=0.0))))
 
 
 def polish_ratio(
@@ -92,7 +103,7 @@ def polish_ratio(
 
     length = float(np.linalg.norm(y))
     u, residual = _newton(system, np.concatenate([x.ravel(), y / (length if length > 0.0 else 1.0), [s]]), steps)
-    near = system(u)[2]
+    near = system(u)[2] if np.isfinite(residual) else x
     missed = float(np.abs(A @ near.ravel() - b).max(initial=0.0))
     return PolishedRatio(near, u[size:-1], float(u[-1]), max(residual, missed))
 
@@ -107,24 +118,31 @@ def _newton(system: Callable[[Array], tuple[Array, Array, Array]], u: Array, ste
     for _ in range(steps):
         if best <= NOTHING_LEFT or not np.all(np.isfinite(jacobian)):
             break
-        U, s, V = np.linalg.svd(jacobian)
-        turned = U.T @ -rest
         before = best
-        for damping in (0.0, best, best**0.5, best**0.25):
-            safe = np.where(s > 1e-13 * s[0], s, np.inf) if damping == 0.0 else s + damping**2 / np.maximum(s, 1e-300)
-            after = u + V.T @ (turned / safe)
-            if not np.abs(after).max(initial=0.0) < ENDLESS:
+        for after in _steps(jacobian, rest, best):
+            if not np.abs(u + after).max(initial=0.0) < ENDLESS:
                 continue
-            new_rest, new_jacobian, _ = system(after)
-            new = float(np.linalg.norm(new_rest))
+            tried = system(u + after)
+            new = float(np.linalg.norm(tried[0]))
             if new < best:
-                next_u, rest, jacobian, best = after, new_rest, new_jacobian, new
+                step, found, best = after, tried, new
             if best < 0.1 * before:
                 break
         if not best < before:
             break
-        u = next_u
+        u, rest, jacobian = u + step, found[0], found[1]
     return u, float(np.abs(rest).max(initial=0.0))
+
+
+def _steps(jacobian: Array, rest: Array, size: float) -> Iterator[Array]:
+    """Newton's step, and others that are damped more and more."""
+    with contextlib.suppress(np.linalg.LinAlgError):
+        yield np.asarray(np.linalg.solve(jacobian, -rest), dtype=np.float64)
+    U, s, V = np.linalg.svd(jacobian)
+    turned = U.T @ -rest
+    yield V.T @ (turned / np.where(s > 1e-13 * s[0], s, np.inf))
+    for damping in (size, size**0.5, size**0.25):
+        yield V.T @ (turned * s / (s**2 + damping**2))
 
 
 def _blocks(D: Array) -> Array:
