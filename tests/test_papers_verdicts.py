@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from decimal import Decimal
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -181,3 +182,10 @@ def test_the_schema_fits(results: Results) -> None:
     assert Results.model_validate(data) == results
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(data | {"more": 1}, Results.model_json_schema())
+
+
+def test_the_page_of_the_documentation_counts_right(results: Results) -> None:
+    text = (Path(__file__).parents[1] / "docs" / "papers.md").read_text(encoding="utf-8")
+    for done in results.papers:
+        shown = [done.counts[verdict] for verdict in ("reproduced", "corrected", "not reproducible")]
+        assert f"| {done.name} | {' | '.join(map(str, shown))} |" in text
