@@ -339,7 +339,7 @@ ENTRIES = (
     Entry("Fig. 11, section 7", "depth of a rim in the ground, by (3) as printed", "0", partial(_misread, "depth"),
           "mm", "the right normal", "what (3) as printed calls a contact is none"),
     Entry("Fig. 12, (35)", "smallest torque, mission 1", "1.4", partial(_fact, "smallest_paper_torque"), "N*m",
-          reason=_MISSION_1 + " but (3) as printed"),
+          reason=_MISSION_1 + "; (3) as printed comes near"),
     Entry("Fig. 12, (35)", "smallest torque, by (3) as printed", "1.4",
           lambda: _estimate(str(np.degrees(_misread("smallest")))), "N*m", reason="the nearest that any reading comes"),
     Entry("Fig. 12, (35)", "largest torque, mission 1", "4", partial(_fact, "largest_paper_torque"), "N*m"),
