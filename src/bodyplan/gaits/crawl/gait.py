@@ -54,8 +54,8 @@ class Crawl(Gait):
 
     ``step_height`` m of a swing over its straight line (default 0.093 of a leg); more where the ground demands it.
     ``clearance`` m that links and body keep off the ground where the robot has shapes for them (``shell``; default half
-    of a foot's radius; a shin that ends in its foot as much as it has on level ground): swings are raised for it, other
-    footholds within the search chosen, and the body raised.
+    of a foot's radius; at most 3/4 of what they have on level ground: nothing for a shin that ends in its foot). Swings
+    are raised for it, other footholds within the search chosen, and the body raised.
     ``foothold``: "nearest", where the foot should be, or "search" within ``search_radius`` m (default 0.093 of a leg)
     for ground no steeper than ``max_slope`` rad, if it can be with neither riser nor edge within the foot's radius.
     ``height`` m of the body's frame over the feet's plane (default 0.385 of a leg), ``reach`` m of the feet outward

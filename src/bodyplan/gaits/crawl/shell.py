@@ -19,6 +19,8 @@ from bodyplan.robot.neighbours import separate_contacts
 from bodyplan.spatial import conjugate, rotate
 from bodyplan.spatial.segments import segment_box_clearance, segment_distance
 
+#: share of its distance from level ground that a part must keep at most
+USUAL = 0.75
 #: points along each side of a face of a box over curved ground
 SIDE = 11
 #: m of distances that rounding may change
@@ -63,13 +65,13 @@ class Shell:
         return self.legs.robot.contacts[self.parts[part]].name
 
     def needed(self, stance: Array) -> Array:
-        """(k,) m that every part is to stay off the ground: ``keep``, or what it has where the robot stands on level
-        ground with joints ``stance`` (n,), if that is less: a shin that ends in its foot cannot keep off."""
+        """(k,) m that every part is to stay off the ground: ``keep``, or USUAL of what it has where the robot stands on
+        level ground with joints ``stance`` (n,), if that is less: a shin that ends in its foot cannot keep off."""
         feet = self.legs.feet(stance[None])[0]
         radii = np.array([leg.radius for leg in self.legs.legs])
         level = Plane(float((feet[:, 2] - radii).min()))
         usual = self.gaps(level, self.legs.robot.forward(stance[None]).array, np.full(len(self.parts), np.inf))[0]
-        return np.asarray(np.minimum(self.keep, np.maximum(usual - EXACT, 0.0)))
+        return np.asarray(np.minimum(self.keep, np.maximum(USUAL * usual - EXACT, 0.0)))
 
     def gaps(self, ground: Ground, poses: Array, most: Array) -> Array:
         """Gaps (S, k) m of all parts to the ground at poses (S, F, 7) of all frames, up to ``most`` (k,) m; minus
