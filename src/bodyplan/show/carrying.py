@@ -16,6 +16,8 @@ from bodyplan.spatial import conjugate, matrix_from_quaternion, multiply, quater
 
 #: samples of a long motion that are drawn, and at which cone programs are solved
 SAMPLES, FEW = 600, 60
+#: and around how many leaps of the friction used, and what share of the most of it a leap is
+LEAPS, LEAP = 8, 0.2
 #: headings and heights of a map
 HEADINGS, HEIGHTS = 37, 21
 
@@ -77,7 +79,7 @@ class Carrying:
             used = columns(
                 [_ratio(motion.forces[chosen, w.rim], one.normal) for w, one in zip(wheels, at, strict=True)]
             )
-        few = _even(len(motion.t), FEW)
+        few = np.union1d(_even(len(motion.t), FEW), chosen[_leaps(used)])
         statics, problem = _statics(motion, few)
         return Carrying(
             motion,
@@ -121,6 +123,15 @@ class Carrying:
 
 def _even(count: int, most: int) -> IntArray:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
+def _leaps(used: Array) -> IntArray:
+    """Rows of ``used`` (s, k) before and after the greatest changes from row to row, where they stand out."""
+    known = np.nan_to_num(used)
+    change = np.abs(np.diff(known, axis=0)).max(axis=1, initial=0.0)
+    most = np.sort(np.argsort(-change, kind="stable")[:LEAPS])
+    most = most[change[most] > LEAP * known.max(initial=0.0)]
+    return np.union1d(most, most + 1)
 
 
 def _ratio(force: Array, normal: Array) -> Array:
