@@ -19,6 +19,8 @@ MODERATE = 1e2
 SQUEEZED = 1e5
 #: how near forces of that size come to the least friction
 NEAR = 5e-3
+#: shares of the largest force below which a contact may carry nothing
+FAINT = (1e-6, 1e-4, 1e-2)
 #: coefficients beyond this are no friction
 MOST = 1e8
 #: residual of the conditions of optimality up to which a solution is one
@@ -159,8 +161,8 @@ def _descended(A: Array, b: Array, family: Family, bound: float, s: float, high:
         if reached <= high:
             high, best = reached, (x, found.y)
         if np.isfinite(high) and (abs(found.slack) < 1e-5 or high - floor <= 1e-5 * high):
-            done = polish_ratio(A, b, family.at, x, found.y, min(max(s, floor), high))
-            if _proved(A, family, done) and floor * (1.0 - 1e-4) <= done.s <= high * (1.0 + 1e-4):
+            done = _finished(A, b, family, x, found.y, min(max(s, floor), high))
+            if done.residual <= PROVED and floor * (1.0 - 1e-4) <= done.s <= high * (1.0 + 1e-4):
                 return Factor(done.s, done.x, done.y, family.touching)
             if high - floor <= 1e-10 * high or abs(found.slack) < 1e-10:
                 break
@@ -174,6 +176,24 @@ def _descended(A: Array, b: Array, family: Family, bound: float, s: float, high:
             weight = np.clip(x[:, 0], 1e-3, np.inf)
     y = best[1] / max(float(np.linalg.norm(best[1])), 1e-300)
     return Factor(high, best[0], y, family.touching, exact=False)
+
+
+def _finished(A: Array, b: Array, family: Family, x: Array, y: Array, s: float) -> PolishedRatio:
+    """The exact solution near (x, y, s); its residual is inf where it proves nothing. Where contacts carry next to
+    nothing it may not show at once which of them carry nothing: then from the solution without them."""
+    size = np.linalg.norm(x, axis=1)
+    done = polish_ratio(A, b, family.at, x, y, s)
+    for share in FAINT:
+        if _proved(A, family, done):
+            return done
+        loaded = size > share * size.max()
+        if loaded.all():
+            continue
+        some = Family(family.slope, family.cap, family.touching & loaded)
+        first = polish_ratio(A, b, some.at, np.where(loaded[:, None], x, 0.0), y, s)
+        if first.residual <= PROVED:
+            done = polish_ratio(A, b, family.at, first.x, first.y, first.s, WARM)
+    return done if _proved(A, family, done) else done._replace(residual=np.inf)
 
 
 def _idle(A: Array, cones: Cones, found: Factor) -> BoolArray:
