@@ -73,7 +73,7 @@ class _Writer:
         for shape in self.tree.base_shapes:
             self._touch(shape, "base")
         starts = [(link, "base") for link in reversed(self.children.get(None, []))]
-        first = self.alias
+        first = None if self.alias is None else self.frames[self.alias]
         while starts:
             link, parent = starts.pop()
             sides = self._chain(link, parent, first)
