@@ -38,6 +38,16 @@ def test_the_figure_has_every_foothold(walk):
     assert [label for label in labels if label.endswith(".foot")] == ["fl.foot", "fr.foot", "hl.foot", "hr.foot"]
 
 
+def test_of_a_shell_only_feet_are_meant_to_touch():
+    from bodyplan.show.playback import Playback
+    from bodyplan.show.schedule import schedule
+
+    motion = bp.plan(bp.silo4(shell=True), bp.Crawl(), bp.Plane(), bp.times(0, 12, dt=0.1))
+    _, names, touching = schedule(Playback.of(motion, None))
+    assert names == ("fl.foot", "fr.foot", "hl.foot", "hr.foot") and touching.shape[1] == 4
+    assert touching.sum(axis=1).min() == 3
+
+
 def test_other_gaits_have_no_such_part():
     snake = bp.snake(12, 0.1, axes="pitch")
     motion = bp.plan(snake, bp.Rectilinear(3, lift=0.0), bp.Plane(), bp.times(0, 1, dt=0.1))
@@ -84,7 +94,9 @@ def test_loads_are_said_and_drawn(walk):
     assert "What the feet carry" in page and f"{np.nanmax(found.normal):.3g}" in page
     plots = loads_plots(walk)
     assert [curve["name"] for curve in plots["walk_loads"]["data"]] == list(found.feet)
-    assert set(plots) <= set(crawling_plots(walk))
+    assert set(plots) == {"walk_loads", "walk_friction"} and set(plots) <= set(crawling_plots(walk))
+    level = bp.plan(bp.silo4(), bp.Crawl(), bp.Plane(), bp.times(0, 3, dt=0.1))
+    assert set(loads_plots(level)) == {"walk_loads"} and "without friction" in loads_text(level)
 
 
 def test_where_it_tips_no_friction_is_enough():

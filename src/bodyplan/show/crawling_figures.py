@@ -9,6 +9,7 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.errors import BodyplanError
+from bodyplan.ground.field import Field
 from bodyplan.motion import Motion
 from bodyplan.robot.masses import center_from_poses
 from bodyplan.show.crawling_loads import LEGS, is_crawl, stood
@@ -89,8 +90,9 @@ def _ground(ax: Any, ground: Any, low: Array, high: Array) -> None:
         return
     if np.ptp(z) > 1e-6:
         shades = ax.pcolormesh(x, y, z, cmap="Greys", alpha=0.45, shading="auto", rasterized=True)
-        lines = ax.contour(x, y, z, levels=CONTOURS, colors=SHADE, linewidths=0.5)
-        ax.clabel(lines, fontsize=6, fmt="%g")
+        if isinstance(ground, Field):  # of steps the shades say enough
+            lines = ax.contour(x, y, z, levels=CONTOURS, colors=SHADE, linewidths=0.5)
+            ax.clabel(lines, fontsize=6, fmt="%g")
         ax.figure.colorbar(shades, ax=ax, label="ground (mm)", shrink=0.8, pad=0.02)
 
 

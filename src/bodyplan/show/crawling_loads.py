@@ -20,6 +20,8 @@ from bodyplan.show.text import figure, plot
 LEGS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 #: samples at which forces are worked out; m/s^2
 SAMPLES, GRAVITY = 240, 9.81
+#: a coefficient of friction that is none but for rounding
+NONE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,11 @@ class Loads:
     feet: tuple[str, ...]
     normal: Array
     needed: Array
+
+    @property
+    def rubs(self) -> bool:
+        """Whether it needs any friction where it can stand."""
+        return bool(np.any(np.isfinite(self.needed) & (self.needed > NONE)))
 
 
 def is_crawl(motion: Motion) -> bool:
@@ -92,19 +99,24 @@ def loads_text(motion: Motion) -> str:
     said = (
         f"<h3>What the feet carry</h3><p>At rest in its poses the robot puts up to <b>"
         f"{figure(float(found.normal[at, foot]), 'N', 3)}</b> on a foot ({found.feet[foot]}, at "
-        f"{figure(float(found.t[at]), 's', 3)}), and needs a coefficient of friction of <b>"
-        f"{figure(float(found.needed[k]), '', 2)}</b> (at {figure(float(found.t[k]), 's', 3)}): with less the ground "
-        "cannot hold it, however the feet share."
+        f"{figure(float(found.t[at]), 's', 3)})"
     )
+    if found.rubs:
+        said += (
+            f", and needs a coefficient of friction of <b>{figure(float(found.needed[k]), '', 2)}</b> (at "
+            f"{figure(float(found.t[k]), 's', 3)}): with less the ground cannot hold it, however the feet share."
+        )
+    else:
+        said += ". Wherever it can stand it could do so without friction."
     if np.any(np.isinf(found.needed)):
         first = float(found.t[np.isinf(found.needed)][0])
         said += f" From {figure(first, 's', 3)} on there are times when no friction is enough: <b>there it tips</b>."
-    return (
-        said
-        + "</p>"
-        + plot("walk_loads", "Load of each foot across the ground, of least square in all, in friction cones.")
-        + plot("walk_friction", "The least coefficient of friction with which the robot can stand so.")
+    said += "</p>" + plot(
+        "walk_loads", "Load of each foot across the ground, of least square in all, in friction cones."
     )
+    if found.rubs:
+        said += plot("walk_friction", "The least coefficient of friction with which the robot can stand so.")
+    return said
 
 
 def loads_plots(motion: Motion) -> dict[str, dict[str, Any] | None]:
@@ -119,7 +131,8 @@ def loads_plots(motion: Motion) -> dict[str, dict[str, Any] | None]:
     mu = np.where(np.isfinite(found.needed), found.needed, np.nan)
     friction = layout("time (s)", "friction needed", 240)
     friction["yaxis"]["rangemode"] = "tozero"
-    return {
-        "walk_loads": {"data": curves, "layout": layout("time (s)", "load of a foot (N)", 300)},
-        "walk_friction": {"data": [line(found.t, mu, "needed", EXECUTED, showlegend=False)], "layout": friction},
-    }
+    loads = {"data": curves, "layout": layout("time (s)", "load of a foot (N)", 300)}
+    if not found.rubs:
+        return {"walk_loads": loads}
+    needed = {"data": [line(found.t, mu, "needed", EXECUTED, showlegend=False)], "layout": friction}
+    return {"walk_loads": loads, "walk_friction": needed}

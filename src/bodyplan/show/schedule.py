@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bodyplan.arrays import Array
+from bodyplan.show.crawling_loads import is_crawl, stood
 from bodyplan.show.layout import label, layout
 from bodyplan.show.playback import Playback
 from bodyplan.show.series import PLANNED, compact, one_cycle
@@ -26,8 +27,10 @@ def schedule(playback: Playback) -> tuple[Array, tuple[str, ...], Array] | None:
     if motion.contacts is None or motion.contacts.size == 0 or bool(np.all(motion.contacts)):
         return None
     chosen = one_cycle(playback)
-    names = tuple(contact.name for contact in motion.robot.contacts)
-    return motion.t[chosen] - motion.t[0], names, (motion.contacts[chosen] > 0.5).astype(float)
+    # of a robot on feet only they are ever to touch, and not the shell of its links and body
+    kept = stood(motion) if is_crawl(motion) else list(range(len(motion.robot.contacts)))
+    names = tuple(motion.robot.contacts[k].name for k in kept)
+    return motion.t[chosen] - motion.t[0], names, (motion.contacts[chosen][:, kept] > 0.5).astype(float)
 
 
 def schedule_part(playback: Playback) -> str:
