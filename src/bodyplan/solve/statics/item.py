@@ -10,7 +10,7 @@ from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.solve.statics.cones import CONE, RAY, Cones
 from bodyplan.solve.statics.conic import least
-from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, balance
+from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, Balance, balance
 from bodyplan.solve.statics.factor import PROVED, Factor, Family, faces, holds_with_any_friction, least_factor
 from bodyplan.solve.statics.polish import WARM, polish_norm
 
@@ -43,12 +43,25 @@ def smallest(held: Balance, cones: Cones, start: Array | None = None) -> tuple[A
     if start is not None:
         done = polish_norm(A, b, cones, start, WARM)
         if done.residual <= PROVED:
-            return done.x, done.y
+            return _settled(held, done.x), done.y
     found = least(A, b, cones, 1.0, np.zeros((len(cones.kind), 3)))
     if found.status == "infeasible" or not np.all(np.isfinite(found.x)):
         return None
     done = polish_norm(A, b, cones, found.y)
-    return (done.x, done.y) if done.residual <= PROVED else None
+    return (_settled(held, done.x), done.y) if done.residual <= PROVED else None
+
+
+def _settled(held: Balance, x: Array) -> Array:
+    """x with what rounding leaves of the equations made up by the contacts that carry something: large forces that
+    squeeze would leave a share of their size, and equilibrium comes before the edge of a cone."""
+    rest = held.b - held.A @ x.ravel()
+    if np.abs(rest).max(initial=0.0) <= 1e-14:
+        return x
+    size = np.linalg.norm(x, axis=1)
+    loaded = np.repeat(size > 1e-6 * size.max(), 3)
+    step = np.zeros(x.size)
+    step[loaded] = np.linalg.lstsq(held.A[:, loaded], rest, rcond=RANK)[0]
+    return x + step.reshape(x.shape)
 
 
 def on_faces(A: Array, b: Array, cones: Cones) -> Balance:
