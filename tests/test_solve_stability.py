@@ -51,6 +51,38 @@ def test_hull_and_distances_are_those_of_scipy(seed: int, count: int) -> None:
 
 
 @settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(3, 8), st.booleans())
+def test_any_direction_of_gravity_by_trying_all_pairs_of_feet(seed: int, count: int, inside: bool) -> None:
+    """Without a hull: a pair of feet is an edge where the plane through it along gravity has all feet on one side."""
+    rng = np.random.default_rng(seed)
+    feet, gravity = rng.normal(size=(count, 3)), rng.normal(size=3) * rng.uniform(0.1, 10.0)
+    share = rng.uniform(0.1, 1.0, count)
+    com = share @ feet / share.sum() - rng.uniform(0.0, 1.0) * gravity
+    if not inside:
+        com = com + 10.0 * rng.normal(size=3)
+    g = gravity / np.linalg.norm(gravity)
+    mu, distance = [], []
+    for i in range(count):
+        for j in range(count):
+            along = feet[j] - feet[i]
+            inward = np.cross(along, g)
+            if i == j or np.any((feet - feet[i]) @ inward < -1e-12):
+                continue
+            s = np.cross(feet[i] - com, feet[j] - com)
+            mu.append(abs(s @ g) / np.linalg.norm(s) * np.sign((com - feet[i]) @ inward))
+            distance.append((com - feet[i]) @ inward / np.linalg.norm(inward))
+    got = tip_margins(feet, gravity, com)
+    assert got.count == len(mu)
+    assert np.abs(np.sort(got.mu[: got.count]) - np.sort(mu)).max() < 1e-9
+    assert np.abs(np.sort(got.distance[: got.count]) - np.sort(distance)).max() < 1e-9
+    assert got.stable == (min(distance) > 0.0)
+    assert not inside or got.stable
+    order = rng.permutation(count)
+    again = tip_margins(feet[order], gravity, com)
+    assert float(again.min_mu) == pytest.approx(min(mu), abs=1e-9)
+
+
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_mu_by_the_formulas_of_the_paper(seed: int) -> None:
     """(19), (21) with the edges clockwise seen from above, and the angle of the notes."""
