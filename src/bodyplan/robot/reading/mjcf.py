@@ -39,10 +39,20 @@ def read_mjcf(
     read_text(path)
     with located(str(path)):
         try:
-            model = _compiled(mujoco, lambda: mujoco.MjSpec.from_file(os.fspath(path)))
+            model = _quietly(mujoco, lambda: _compiled(mujoco, lambda: mujoco.MjSpec.from_file(os.fspath(path))))
         except ValueError as error:
             raise InputError(f"MuJoCo cannot read it: {' '.join(str(error).split())}") from error
         return parts_of(_Reader(mujoco, model).tree(root, Path(path).stem), contacts)
+
+
+def _quietly(mj: Any, work: Any) -> Any:
+    """What ``work()`` returns; MuJoCo's warnings of the initial pose go into no log file in the working directory."""
+    before = mj.get_mju_user_warning()
+    mj.set_mju_user_warning(lambda text: None)
+    try:
+        return work()
+    finally:
+        mj.set_mju_user_warning(before)
 
 
 def _compiled(mj: Any, read: Any) -> Any:
