@@ -26,9 +26,11 @@ LIBRARIES = {
     "plotly": ("plotly", "report", "report.html"),
     "sympy": ("sympy", "symbolic", "formulas and C99 source"),
     "clarabel": ("clarabel", "solve", "contact forces, rates within limits"),
+    "mcap-ros2-support": ("mcap_ros2", "ros", "MCAP logs for ROS 2"),
+    "trimesh": ("trimesh", "gltf", "animated glTF (.glb)"),
     "viser": ("viser", "view", "live viewer: bodyplan view"),
     "distributed": ("distributed", "cluster", "bodyplan sweep"),
-    "optuna": ("optuna", "cluster", "bodyplan optimise"),
+    "optuna": ("optuna", "search", "bodyplan optimise"),
 }
 #: oldest Python
 PYTHON = (3, 11)

@@ -48,8 +48,9 @@ class BicubicSpline:
 
         n = len(x)
         value, gradient, hessian = np.empty(n), np.empty((n, 2)), np.empty((n, 2, 2))
-        places = (np.ascontiguousarray(v, dtype=np.float64) for v in (x, y))
-        spline_jet(self.nodes, float(self.step[0]), float(self.step[1]), *places, value, gradient, hessian)
+        at_x, at_y = (np.ascontiguousarray(v, dtype=np.float64) for v in (x, y))
+        dx, dy = (float(v) for v in self.step)
+        spline_jet(self.nodes, dx, dy, at_x, at_y, value, gradient, hessian)
         return value + self.level, gradient, hessian
 
     def value(self, x: Array, y: Array) -> Array:
