@@ -122,6 +122,44 @@ def test_a_robot_from_its_file_walks() -> None:
     assert report.ok, str(report)
 
 
+def test_links_without_a_purpose_become_part_of_what_carries_them() -> None:
+    """HyQ without its fixed extras: the same kinematics and the same centre of mass."""
+    path = data_file("hyq_no_sensors.urdf")
+    whole, feet = Robot.from_urdf(path), ["lf_foot", "rf_foot", "lh_foot", "rh_foot"]
+    robot = Robot.from_urdf(path, ends=feet)
+    assert [chain.name for chain in robot.chains] == feet and len(whole.chains) > 4
+    assert robot.mass == pytest.approx(whole.mass, rel=1e-14)
+    q = random_q(robot, np.random.default_rng(5))
+    values = dict(zip(robot.joints, q, strict=True))
+    here, there = robot.forward(values), whole.forward(values)
+    for frame in set(robot.frames) & set(whole.frames):
+        np.testing.assert_allclose(here[frame], there[frame], rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(center_of_mass(robot, q), center_of_mass(whole, values), rtol=0.0, atol=1e-14)
+    assert {c.name for c in robot.contacts} == {c.name for c in whole.contacts}
+    with pytest.raises(bp.InputError, match="joint 'rh_haa_joint' moves link 'rh_hipassembly', on the way to no end"):
+        Robot.from_urdf(path, ends=feet[:3])
+    with pytest.raises(bp.UnknownNameError, match=r"ends: unknown link 'lf_fot'. Did you mean 'lf_foot'"):
+        Robot.from_urdf(path, ends=["lf_fot"])
+
+
+def test_merged_inertia_is_that_of_pinocchio() -> None:
+    """Pinocchio merges fixed links by itself: inertia of every joint's part."""
+    reference = Reference(data_file("a1.urdf"))
+    robot = Robot.from_urdf(reference.path, ends=["FL_calf", "FR_calf", "RL_calf", "RR_calf"])
+    bodies = dict(zip(robot.frames[1:], (e.body for e in robot.elements), strict=True))
+    for leg in ("FL", "FR", "RL", "RR"):
+        for link, joint in (("hip", "hip"), ("thigh", "thigh"), ("calf", "calf")):
+            body = bodies[f"{leg}_{link}"]
+            expected = reference.model.inertias[reference.model.getJointId(f"{leg}_{joint}_joint")]
+            assert body is not None and body.inertia is not None
+            xx, yy, zz, xy, xz, yz = body.inertia
+            assert body.mass == pytest.approx(expected.mass, rel=1e-14)
+            np.testing.assert_allclose(body.com, expected.lever, rtol=0.0, atol=1e-15)
+            np.testing.assert_allclose(
+                [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], expected.inertia, rtol=0.0, atol=1e-15
+            )
+
+
 def test_broken_models_are_refused_by_name() -> None:
     path = data_file("alex_psyonic_hands.urdf")
     with pytest.raises(bp.UnknownNameError, match="'Left_index_q2', mimic: unknown moving joint 'index_q1'"):

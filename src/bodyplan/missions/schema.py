@@ -77,14 +77,14 @@ def _robot_table(path: str) -> Robot:
     return Robot.from_table(path)
 
 
-def _robot_urdf(file: str, mimic: bool = True) -> Robot:
+def _robot_urdf(file: str, mimic: bool = True, ends: Sequence[str] | None = None) -> Robot:
     """A robot from a URDF file."""
-    return Robot.from_urdf(file, mimic=mimic)
+    return Robot.from_urdf(file, mimic=mimic, ends=ends)
 
 
-def _robot_mjcf(file: str, root: str | None = None) -> Robot:
+def _robot_mjcf(file: str, root: str | None = None, ends: Sequence[str] | None = None) -> Robot:
     """A robot from an MJCF file, read by MuJoCo."""
-    return Robot.from_mjcf(file, root=root)
+    return Robot.from_mjcf(file, root=root, ends=ends)
 
 
 #: kind -> (builder, units of its options)

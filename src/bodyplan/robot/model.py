@@ -322,7 +322,12 @@ class Robot:
 
     @classmethod
     def from_urdf(
-        cls, path: str | os.PathLike[str], *, mimic: bool = True, contacts: Sequence[Contact] | None = None
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        mimic: bool = True,
+        ends: Sequence[str] | None = None,
+        contacts: Sequence[Contact] | None = None,
     ) -> Robot:
         """The robot in a URDF file: fixed, revolute, continuous and prismatic joints, mimics, limits, masses.
 
@@ -330,26 +335,33 @@ class Robot:
         "base" or "world" without being the root, "base.link", and slashes in names are dots). A fixed transform
         becomes constant rows. Collision shapes (spheres, boxes, capsules, cylinders) become contacts, unless
         ``contacts`` are given; meshes are ignored. An effort or a velocity of 0 and a range of no width count as
-        unknown. ``mimic`` False: joints that mimic others are joints of their own. InputError names the file and the
-        link or joint."""
+        unknown. ``mimic`` False: joints that mimic others are joints of their own. ``ends``: links in which chains
+        end; links that are fixed elsewhere become part of what carries them. InputError names the file and the link or
+        joint."""
         from bodyplan.robot.reading.urdf import read_urdf
 
-        return cls(*read_urdf(path, mimic, contacts))
+        return cls(*read_urdf(path, mimic, ends, contacts))
 
     @classmethod
     def from_mjcf(
-        cls, path: str | os.PathLike[str], *, root: str | None = None, contacts: Sequence[Contact] | None = None
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        root: str | None = None,
+        ends: Sequence[str] | None = None,
+        contacts: Sequence[Contact] | None = None,
     ) -> Robot:
         """The robot in an MJCF file, as MuJoCo (extra "physics") compiles it: hinges, slides, masses, limits, and
         joints and fixed tendons that equality constraints couple by a straight line.
 
         Every body is a frame of the same name, in the same place, and joint coordinates are MuJoCo's. A body with a
         free joint is the base; without one the base is the world. ``root`` names the body on the world that is the
-        robot where there are several. Joints without an actuator are passive if any has one. ``contacts`` as in
-        :meth:`from_urdf`, else the primitive geoms that can touch. InputError for ball joints and closed loops."""
+        robot where there are several. Joints without an actuator are passive if any has one. ``ends`` and ``contacts``
+        as in :meth:`from_urdf`; contacts are else the primitive geoms that can touch. InputError for ball joints and
+        closed loops."""
         from bodyplan.robot.reading.mjcf import read_mjcf
 
-        return cls(*read_mjcf(path, root, contacts))
+        return cls(*read_mjcf(path, root, ends, contacts))
 
     def to_urdf(self, path: str | os.PathLike[str]) -> None:
         """Write the robot as URDF (:func:`bodyplan.export.urdf.write`)."""

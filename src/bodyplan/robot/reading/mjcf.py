@@ -16,6 +16,7 @@ from bodyplan.robot.drive_text import located
 from bodyplan.robot.elements import Body, Contact, Joint
 from bodyplan.robot.files import read_text
 from bodyplan.robot.reading.couplings import Couplings
+from bodyplan.robot.reading.pruning import pruned
 from bodyplan.robot.reading.rows import Screw, along, axis_frame
 from bodyplan.robot.reading.shapes import Shape
 from bodyplan.robot.reading.tree import Link, Parts, Tree, parts_of, unique
@@ -28,7 +29,10 @@ SPECK = 1e-14
 
 
 def read_mjcf(
-    path: str | os.PathLike[str], root: str | None = None, contacts: Sequence[Contact] | None = None
+    path: str | os.PathLike[str],
+    root: str | None = None,
+    ends: Sequence[str] | None = None,
+    contacts: Sequence[Contact] | None = None,
 ) -> Parts:
     """Arguments of Robot from an MJCF file (:meth:`bodyplan.robot.model.Robot.from_mjcf`). InputError names the file
     and the body, joint or constraint; MissingExtraError without MuJoCo."""
@@ -42,7 +46,8 @@ def read_mjcf(
             model = _quietly(mujoco, lambda: _compiled(mujoco, lambda: mujoco.MjSpec.from_file(os.fspath(path))))
         except ValueError as error:
             raise InputError(f"MuJoCo cannot read it: {' '.join(str(error).split())}") from error
-        return parts_of(_Reader(mujoco, model).tree(root, Path(path).stem), contacts)
+        tree = _Reader(mujoco, model).tree(root, Path(path).stem)
+        return parts_of(tree if ends is None else pruned(tree, ends), contacts)
 
 
 def _quietly(mj: Any, work: Any) -> Any:

@@ -17,6 +17,7 @@ from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.drive_text import located
 from bodyplan.robot.elements import Body, Contact, Joint
 from bodyplan.robot.files import read_text
+from bodyplan.robot.reading.pruning import pruned
 from bodyplan.robot.reading.rows import Screw, along, axis_frame
 from bodyplan.robot.reading.shapes import Shape, rounded
 from bodyplan.robot.reading.tree import Link, Parts, Tree, parts_of, unique
@@ -26,7 +27,12 @@ MOVING = ("revolute", "continuous", "prismatic")
 BOUNDLESS = 1e30
 
 
-def read_urdf(path: str | os.PathLike[str], mimic: bool = True, contacts: Sequence[Contact] | None = None) -> Parts:
+def read_urdf(
+    path: str | os.PathLike[str],
+    mimic: bool = True,
+    ends: Sequence[str] | None = None,
+    contacts: Sequence[Contact] | None = None,
+) -> Parts:
     """Arguments of Robot from a URDF file (:meth:`bodyplan.robot.model.Robot.from_urdf`). InputError names the file and
     the link or joint."""
     text = read_text(path)
@@ -37,7 +43,8 @@ def read_urdf(path: str | os.PathLike[str], mimic: bool = True, contacts: Sequen
             root = ET.fromstring(text)
         except (ET.ParseError, ValueError) as error:
             raise InputError(f"is not XML: {error}.") from error
-        return parts_of(_tree(root, Path(path).stem, mimic), contacts)
+        tree = _tree(root, Path(path).stem, mimic)
+        return parts_of(tree if ends is None else pruned(tree, ends), contacts)
 
 
 def _tree(root: ET.Element, stem: str, mimic: bool) -> Tree:
