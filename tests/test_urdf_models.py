@@ -113,13 +113,27 @@ def test_collision_shapes_become_contacts_where_they_are() -> None:
     )
 
 
-def test_a_robot_from_its_file_walks() -> None:
-    feet = [Contact(f"{leg}.foot", f"{leg}_FOOT", "sphere", 0.016) for leg in ("FL", "FR", "HL", "HR")]
-    robot = Robot.from_urdf(data_file("solo12.urdf"), contacts=feet)
-    motion = bp.plan(robot, bp.Crawl(velocity=(0.02, 0.0)), bp.Plane(), bp.times(0, 8, dt=0.04))
+@pytest.mark.parametrize(
+    ("name", "foot", "radius"),
+    [("solo12.urdf", "{}_FOOT", 0.016), ("a1.urdf", "{}_foot", 0.02), ("hyq_no_sensors.urdf", "{}_foot", 0.02)],
+)
+def test_a_robot_from_its_file_walks(name: str, foot: str, radius: float) -> None:
+    """Also where legs hang on a trunk that is fixed on the root, and with sensors about."""
+    path = data_file(name)
+    legs = {"solo12.urdf": ("FL", "FR", "HL", "HR"), "a1.urdf": ("FL", "FR", "RL", "RR")}
+    feet = [foot.format(leg) for leg in legs.get(name, ("lf", "rf", "lh", "rh"))]
+    contacts = [Contact(f"{frame}.ball", frame, "sphere", radius) for frame in feet]
+    robot = Robot.from_urdf(path, ends=feet, contacts=contacts)
+    assert [(chain.name, chain.parent) for chain in robot.chains] == [(frame, "base") for frame in robot_order(robot)]
+    motion = bp.plan(robot, bp.Crawl(velocity=(0.02, 0.0)), bp.Plane(), bp.times(0, 6, dt=0.04))
     assert set(motion.status) == {"ok"}
     report = bp.check(motion)
     assert report.ok, str(report)
+
+
+def robot_order(robot: Robot) -> list[str]:
+    """Frames with a ball, in the order of the frames."""
+    return sorted((contact.frame for contact in robot.contacts), key=robot.frame_index)
 
 
 def test_links_without_a_purpose_become_part_of_what_carries_them() -> None:

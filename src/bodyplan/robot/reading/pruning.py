@@ -24,11 +24,13 @@ class _Part:
 
 def pruned(tree: Tree, ends: Iterable[str]) -> Tree:
     """The tree with the links on the ways from the base to ``ends`` alone; other links, all fixed, are merged into the
-    link that carries them, with their masses and shapes. Raises UnknownNameError for an end that is no link, InputError
+    link that carries them, with their masses and shapes, and so is what is fixed on the base, unless it is an end:
+    what moves on it begins at the base. Raises UnknownNameError for an end that is no link, InputError
     where a joint moves a link that would go."""
     links = {link.name: link for link in tree.links}
     kept: set[str | None] = {None, tree.base}
-    for end in ends:
+    named = tuple(ends)
+    for end in named:
         if end not in links and end != tree.base:
             raise UnknownNameError("link", end, links, where="ends")
         at: str | None = end
@@ -38,23 +40,26 @@ def pruned(tree: Tree, ends: Iterable[str]) -> Tree:
     parts: dict[str | None, _Part] = {tree.base: _Part(tree.base_body, tree.base_shapes), None: _Part(None, ())}
     # for every link that goes, what carries it and where it is on that
     carried: dict[str, tuple[str | None, Array]] = {}
+    left: list[Link] = []
     for link in tree.links:
-        if link.name in kept:
+        carrier, place = carried.get(link.parent or "", (link.parent, np.eye(4)))
+        on_base = carrier in (None, tree.base) and not link.screws
+        if link.name in kept and (link.name in named or not on_base):
             parts[link.name] = _Part(link.body, link.shapes)
+            left.append(_moved(link, carrier, place))
             continue
         if link.screws:
             moving = link.screws[0].drive.name
             raise InputError(f"ends: joint {moving!r} moves link {link.name!r}, on the way to no end; name it as well.")
-        carrier, place = carried.get(link.parent or "", (link.parent, np.eye(4)))
         place = place @ link.after
         carried[link.name] = carrier, place
         part = parts[carrier]
         if link.body is not None:
             part.body = joined(part.body, link.body, place)
         part.shapes += tuple(replace(shape, place=place @ shape.place) for shape in link.shapes)
-    left = tuple(_furnished(link, parts[link.name]) for link in tree.links if link.name in kept)
+    links_left = tuple(replace(x, body=parts[x.name].body, shapes=parts[x.name].shapes) for x in left)
     base = parts[tree.base]
-    return replace(tree, links=left, base_body=base.body, base_shapes=base.shapes)
+    return replace(tree, links=links_left, base_body=base.body, base_shapes=base.shapes)
 
 
 def joined(one: Body | None, other: Body, place: Array) -> Body:
@@ -79,5 +84,9 @@ def _tensor(body: Body) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _furnished(link: Link, part: _Part) -> Link:
-    return replace(link, body=part.body, shapes=part.shapes)
+def _moved(link: Link, carrier: str | None, place: Array) -> Link:
+    """The link on ``carrier``, where its parent is at ``place``."""
+    if not link.screws:
+        return replace(link, parent=carrier, after=place @ link.after)
+    first = replace(link.screws[0], before=place @ link.screws[0].before)
+    return replace(link, parent=carrier, screws=(first, *link.screws[1:]))
