@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
@@ -152,7 +154,7 @@ def _local(workers: int) -> Iterator[Any]:
     import dask
 
     try:
-        with dask.config.set(DEALING):
+        with dask.config.set(DEALING), _deaf():
             cluster = distributed_().LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -167,6 +169,19 @@ def _local(workers: int) -> Iterator[Any]:
         raise InputError(f"the worker processes did not start ({error}). {GUARD}") from error
     with cluster, distributed_().Client(cluster) as client:
         yield client
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes started now take no notice of ctrl-C, which a terminal sends to all: this process ends them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 GUARD = 'A script that sweeps or optimises needs if __name__ == "__main__": around what it runs.'
