@@ -36,11 +36,11 @@ def inline(motion: Motion, trial: Trial | None = None, *, height: int = 640) -> 
     """The report of a motion, with its replay, as the result of a notebook's cell.
 
     ``trial``: what :func:`bodyplan.simulate` made of it. ``height`` px of the frame. The page is part of the notebook
-    and needs no network. Raises as :func:`bodyplan.show.single.write_motion_page`.
+    and needs no network. Raises as :func:`bodyplan.show.show` with a path.
     """
-    from bodyplan.show.single import write_motion_page
+    from bodyplan.show import show
 
     tall = int(number(height, "height", at_least=200.0, at_most=5000.0))
     with tempfile.TemporaryDirectory() as folder:
-        path = write_motion_page(motion, trial, Path(folder) / "report.html")
+        path = show(motion, trial, path=Path(folder) / "report.html", open_browser=False)
         return Inline(path.read_text(encoding="utf-8"), tall)
