@@ -94,20 +94,36 @@ class Shell:
         """The smallest gap m between two shapes of the robot that are no neighbours, feet included, at which of the
         poses (S, F, 7), and their names; infinite for a robot without such."""
         best, when, names = np.inf, 0, ("", "")
+        slim, boxed = self._pairs
+        if len(slim):
+            used = np.unique(slim)
+            ends = {k: self._placed(k, poses, _skeleton(self._contact(k))) for k in used.tolist()}
+            radii = np.array([self._contact(a).radius + self._contact(b).radius for a, b in slim])
+            first, second = (np.stack([ends[k] for k in column]) for column in slim.T.tolist())
+            gaps = segment_distance(first, second) - radii[:, None]
+            pair, sample = np.unravel_index(gaps.argmin(), gaps.shape)
+            best, when = float(gaps[pair, sample]), int(sample)
+            names = self._contact(int(slim[pair, 0])).name, self._contact(int(slim[pair, 1])).name
+        for a, b in boxed:
+            gap = self._to_box(a, b, poses)
+            if gap.min() < best:
+                best, when = float(gap.min()), int(gap.argmin())
+                names = self._contact(a).name, self._contact(b).name
+        return best, when, names
+
+    @cached_property
+    def _pairs(self) -> tuple[IntArray, list[tuple[int, int]]]:
+        """Pairs (n, 2) of capsules and spheres that are no neighbours, and (box, other) pairs."""
+        slim, boxed = [], []
         for a, b in separate_contacts(self.legs.robot):
-            one, other = self._contact(a), self._contact(b)
-            shapes = {one.shape, other.shape}
-            if "rim" in shapes or (one.shape == other.shape == "box"):
+            shapes = self._contact(a).shape, self._contact(b).shape
+            if "rim" in shapes or shapes == ("box", "box"):
                 continue
             if "box" in shapes:
-                box, slim = (a, b) if one.shape == "box" else (b, a)
-                gap = self._to_box(box, slim, poses)
+                boxed.append((a, b) if shapes[0] == "box" else (b, a))
             else:
-                first, second = (self._placed(k, poses, _skeleton(self._contact(k))) for k in (a, b))
-                gap = segment_distance(first, second) - one.radius - other.radius
-            if gap.min() < best:
-                best, when, names = float(gap.min()), int(gap.argmin()), (one.name, other.name)
-        return best, when, names
+                slim.append((a, b))
+        return np.array(slim, dtype=np.int64).reshape(-1, 2), boxed
 
     def _contact(self, k: int) -> Contact:
         return self.legs.robot.contacts[k]
