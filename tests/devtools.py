@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-#: nothing of the browser's own may reach out or ask; pictures in 3D are drawn without a graphics card
+#: nothing of the browser's own may reach out or ask
 QUIET = (
     "--headless",
     "--no-sandbox",
@@ -21,9 +21,17 @@ QUIET = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
 )
+#: pictures in 3D are drawn without a graphics card
+DRAWING = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+def dump(address: str, profile: Path, width: int, height: int = 900) -> str:
+    """The page at an address as text, as it is after 4 s of its own time; ``profile`` is an empty folder."""
+    assert BROWSER is not None
+    size = (f"--user-data-dir={profile}", f"--window-size={width},{height}", "--virtual-time-budget=4000")
+    command = [BROWSER, *QUIET, "--disable-gpu", *size, "--dump-dom", address]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
 
 
 class Page:
@@ -33,7 +41,7 @@ class Page:
         from websockets.sync.client import connect
 
         assert BROWSER is not None
-        command = [BROWSER, *QUIET, f"--user-data-dir={folder}", f"--window-size={width},{height}"]
+        command = [BROWSER, *QUIET, *DRAWING, f"--user-data-dir={folder}", f"--window-size={width},{height}"]
         command += ["--remote-debugging-port=0", "about:blank"]
         self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:

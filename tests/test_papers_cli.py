@@ -5,8 +5,6 @@ from __future__ import annotations
 import html
 import json
 import re
-import shutil
-import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -21,8 +19,8 @@ from bodyplan.papers import Entry, Paper
 from bodyplan.papers import rectilinear as module
 from bodyplan.papers.page import off_text, pretty, with_unit
 from bodyplan.papers.results import Row
+from devtools import BROWSER, dump
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 ORDER = ("error", "differs", "corrected", "reproduced", "not reproducible")
 
 
@@ -174,10 +172,7 @@ def test_the_page_fits_the_window(width: int, run: tuple[Any, Path, Path], tmp_p
     (tmp_path / "probed.html").write_text(free.replace("</body></html>", f"{PROBE}</body></html>"), encoding="utf-8")
     around = tmp_path / "around.html"
     around.write_text(AROUND.replace("{width}", str(width)), encoding="utf-8")
-    options = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--window-size=1300,900",
-               f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=3000")  # fmt: skip
-    command = [str(BROWSER), *options, "--dump-dom", around.as_uri()]
-    dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    dom = dump(around.as_uri(), tmp_path / "profile", 1300)
     tag = re.search(r"<html\b([^>]*)>", dom)
     assert tag
     found = dict(re.findall(r'data-([\w-]+)="([^"]*)"', tag[1]))

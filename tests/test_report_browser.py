@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import html
 import re
-import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from bodyplan.show.fit_page import fit_page
 from bodyplan.show.outcome import Grid, GridPoint
 from bodyplan.show.playback import Playback
 from bodyplan.show.report import page
+from devtools import BROWSER, dump
 from inching_report_cases import five, five_trial
 from report_cases import cart, caterpillar, evil_report, follower, outcome, roller, stick
 
@@ -34,7 +33,6 @@ def content(report: Path) -> str:
     return report.read_text(encoding="utf-8")
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 #: measures the page when it is drawn, and tells the page around it
 PROBE = """<script>addEventListener("load", () => setTimeout(() => {
   const root = document.documentElement;
@@ -106,17 +104,6 @@ HAND = """<script>addEventListener("load", () => setTimeout(() => {
 AROUND = """<!doctype html><html><body style="margin:0"><script>
 addEventListener("message", (event) => Object.assign(document.documentElement.dataset, event.data));
 </script><iframe src="probed.html" style="border:0;width:{width}px;height:800px"></iframe></body></html>"""
-#: nothing of the browser's own may reach out or ask
-QUIET = (
-    "--headless",
-    "--no-sandbox",
-    "--no-first-run",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-gpu",
-)
 
 
 @pytest.fixture(scope="session")
@@ -124,13 +111,10 @@ def browse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[object]:
     if BROWSER is None:
         pytest.skip("no chromium, chromium-browser or google-chrome on this machine")
 
-    def dump(path: Path, width: int, fragment: str = "") -> str:
-        profile = tmp_path_factory.mktemp("browser")
-        size = (f"--user-data-dir={profile}", f"--window-size={width},900", "--virtual-time-budget=4000")
-        command = [BROWSER, *QUIET, *size, "--dump-dom", path.as_uri() + fragment]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    def opened(path: Path, width: int, fragment: str = "") -> str:
+        return dump(path.as_uri() + fragment, tmp_path_factory.mktemp("browser"), width)
 
-    yield dump
+    yield opened
 
 
 def attributes(dom: str, tag: str) -> dict[str, str]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from bodyplan.check import body
 from bodyplan.check.claims import test_claim
 from bodyplan.check.report import Line, Report
+from bodyplan.check.shapes import self_clearance
 from bodyplan.check.statics import torques_within
 from bodyplan.errors import InputError
 from bodyplan.motion import Motion
@@ -29,7 +30,7 @@ def check(motion: Motion) -> Report:
         *body.rates_agree(motion),
         *body.joint_limits(motion),
         torques_within(motion),
-        body.self_clearance(motion),
+        self_clearance(motion),
     ]
     try:
         lines += body.ground_clearance(motion)

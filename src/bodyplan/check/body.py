@@ -8,7 +8,6 @@ from bodyplan.arrays import Array, BoolArray
 from bodyplan.check.claims import allowance
 from bodyplan.check.report import Line
 from bodyplan.check.shapes import box_gaps, skeletons
-from bodyplan.check.shapes import self_clearance as self_clearance
 from bodyplan.errors import Status
 from bodyplan.ground import Profile
 from bodyplan.ground.base import Ground
