@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -12,10 +13,13 @@ import pytest
 import bodyplan as bp
 from bodyplan.check import Line, Report
 from bodyplan.errors import InputError, MissingExtraError
+from bodyplan.show.live import telling
+from bodyplan.show.live.session import State
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
 from bodyplan.show.report import page, write_report
 from report_cases import (
+    CYCLES,
     EVIL,
     LOST,
     cart,
@@ -152,6 +156,30 @@ def test_what_was_not_measured_is_a_dash_and_said() -> None:
 def test_a_motion_that_goes_nowhere_is_not_called_a_failure() -> None:
     still = bp.Trial(**{**vars(snake_trial()), "advance_ratios": None, "planned_advance": np.zeros((2, 3))})
     assert "no advance is planned" in words_of(outcome(still))
+
+
+def test_a_body_that_goes_the_other_way_is_said_to() -> None:
+    whole = snake_trial()
+    planned = snake_motion().facts["advance_per_cycle"]
+    back = replace(
+        whole,
+        advance=-1.5 * whole.planned_advance,
+        advance_ratios=np.full(CYCLES, -1.5),
+        speed=-1.5 * planned / whole.period,
+    )
+    said = f"{1500 * planned:.3g} mm a cycle the other way than the planned {1e3 * planned:.3g} mm"
+    text = words_of(outcome(back))
+    assert f"✗ Physics went {said}" in text and f"The body went {said}" in text
+    assert "Executed / planned −150 % it went the other way" in text and "are lost" not in text
+    assert f"The body went {said}" in telling.physics(State(snake_motion(), trial=back)).replace("\u00a0", " ")
+    # whole ones are told as shares
+    assert "the other way" not in words_of(outcome(whole)) + telling.physics(State(snake_motion(), trial=whole))
+
+
+def test_the_plot_of_the_lag_is_said_to_rise_where_physics_gains() -> None:
+    ahead = replace(snake_trial(), advance_ratios=np.full(CYCLES, 1.2))
+    text = words_of(outcome(ahead))
+    assert "rising where it gains on it" in text and "no shorter than the planned one (120 %)" in text
 
 
 # --- that it is one file, and safe

@@ -63,7 +63,7 @@ def _figure(value: float | None, unit: str, scale: float = 1.0, digits: int = 3)
 
 def _summary(result: Result) -> None:
     """One screen: verdict, key figures, the comparison, where the report is."""
-    from bodyplan.show.remarks import gathered, plan_warnings
+    from bodyplan.show.remarks import advance_in_words, gathered, plan_warnings
 
     outcome, plan = result.outcome, result.outcome.motion.facts
     report, trial = outcome.report, outcome.trial
@@ -83,9 +83,11 @@ def _summary(result: Result) -> None:
     if trial is not None:
         row = outcome.itself
         if trial.ok:
-            ratio = "no advance planned" if row.ratio is None else f"{row.ratio:.1%} of the planned advance"
+            advance = advance_in_words(trial, lambda m: _figure(m, "m"), lambda ratio: f"{ratio:.1%}")
+            # the words say which way
+            speed = None if row.speed is None else abs(row.speed)
             typer.echo(
-                f"  physics    {ratio}, {_figure(row.speed, 'mm/s', 1e3)}, "
+                f"  physics    {advance}, {_figure(speed, 'mm/s', 1e3)}, "
                 f"peak torque {_figure(row.peak_torque, 'N m')}, "
                 f"cost of transport {_figure(row.cost_of_transport, '')}"
             )

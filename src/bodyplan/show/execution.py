@@ -8,7 +8,7 @@ from typing import Any
 from bodyplan.robot.model import Robot
 from bodyplan.show.outcome import Outcome, no_slip_ratio
 from bodyplan.show.playback import Playback
-from bodyplan.show.remarks import gathered
+from bodyplan.show.remarks import advance_in_words, gathered, went_back
 from bodyplan.show.stages import stage_rows, worst
 from bodyplan.show.text import (
     counted,
@@ -161,7 +161,11 @@ def _losses(trial: Trial, playback: Playback) -> str:
     return (
         f"<h3>Where the advance goes</h3>\n<p>{_loss_in_words(trial, playback)}</p>"
         + plot("slip", "Negative: backwards. Stages may overlap, then their losses do not add up to the whole.")
-        + plot("lag", f"How the executed advance falls behind the planned one{' within a cycle' if cyclic else ''}.")
+        + plot(
+            "lag",
+            f"The executed advance less the planned one{' within a cycle' if cyclic else ''}: falling where physics "
+            "falls behind the plan, rising where it gains on it.",
+        )
         + folded(f"Table of all {counted(len(cells), 'stage')}", table(head, cells, numbers=(1, 2, 3, 4)))
     )
 
@@ -176,6 +180,8 @@ def _loss_in_words(trial: Trial, playback: Playback) -> str:
         return f"The executed advance is no shorter than the planned one ({percent(ratio)}). {SLIP}"
     most = listed(f"{esc(row.name)} ({figure(row.lag, 'm', 3)})" for row in worst(stage_rows(playback, trial)))
     cycle = "a cycle" if playback.period is not None else "in all"
+    if went_back(trial):
+        return f"<b>The body went {advance_in_words(trial)}</b>{f', most of it in {most}' if most else ''}. {SLIP}"
     return (
         f"<b>{figure(lost, 'm', 3)} of the planned {figure(planned, 'm')} {cycle} "
         f"({percent(1.0 - ratio)}) are lost</b>{f', most of it in {most}' if most else ''}. {SLIP}"

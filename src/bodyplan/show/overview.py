@@ -8,7 +8,7 @@ import numpy as np
 
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
-from bodyplan.show.remarks import plan_warnings
+from bodyplan.show.remarks import advance_in_words, plan_warnings, went_back
 from bodyplan.show.text import counted, esc, figure, listed, percent, plain, unit_of, words
 from bodyplan.simulate.wheels import turning_remarks
 
@@ -116,7 +116,9 @@ def _physics(outcome: Outcome) -> tuple[str, str]:
             f"Physics executed it, at a mean speed of {figure(trial.speed, 'm/s', 3)}; no advance is planned",
             "plain",
         )
-    return f"Physics executed {percent(trial.advance_ratio)} of the planned advance", "plain"
+    if went_back(trial):
+        return f"✗ Physics went {advance_in_words(trial)}", "bad"
+    return f"Physics executed {advance_in_words(trial)}", "plain"
 
 
 def tiles(outcome: Outcome, playback: Playback) -> str:
@@ -140,7 +142,11 @@ def tiles(outcome: Outcome, playback: Playback) -> str:
     cost = measured.get("cost_of_transport")
     items = [
         ("Planned advance", figure(advance, "m", 3, zeros=True), a_cycle),
-        ("Executed / planned", percent(measured.get("advance_ratio")), none or "mean of the cycles"),
+        (
+            "Executed / planned",
+            percent(measured.get("advance_ratio")),
+            none or ("it went the other way" if trial and went_back(trial) else "mean of the cycles"),
+        ),
         (
             "Speed",
             figure(speed, "m/s", 3, zeros=True),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
-from bodyplan.show.text import counted, degrees, figure, listed
+from bodyplan.show.text import counted, degrees, figure, listed, percent
 from bodyplan.simulate.trial import Trial
 
 #: joints that are named where there are many
@@ -27,6 +27,25 @@ WARNING, STOPS = "Warning: ", "Stops at "
 def plan_warnings(motion: Motion) -> list[str]:
     """Notes of a plan that nobody may miss: warnings, and why it stops before its time."""
     return [note.removeprefix(WARNING) for note in motion.notes if note.startswith((WARNING, STOPS))]
+
+
+def went_back(trial: Trial) -> bool:
+    """Whether the body went the other way than its plan, over all cycles together."""
+    return trial.advance_ratio is not None and trial.advance_ratio < 0.0
+
+
+def advance_in_words(
+    trial: Trial, size: Callable[[float], str] = lambda m: figure(m, "m", 3), share: Callable[[float], str] = percent
+) -> str:
+    """What physics made of the advance that is planned: a share of it, or how far it went the other way. ``size`` and
+    ``share`` write lengths in m and ratios. For trials that have measures."""
+    if trial.advance_ratio is None:
+        return "no advance planned"
+    if not went_back(trial):
+        return f"{share(trial.advance_ratio)} of the planned advance"
+    planned = float(np.linalg.norm(trial.planned_advance, axis=1).mean())
+    each = " a cycle" if trial.cycles > 1 else ""
+    return f"{size(-trial.advance_ratio * planned)}{each} the other way than the planned {size(planned)}"
 
 
 def gathered(trial: Trial, robot: Robot) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bodyplan.show.live.session import State
-from bodyplan.show.remarks import plan_warnings
+from bodyplan.show.remarks import advance_in_words, plan_warnings, went_back
 from bodyplan.show.text import counted, esc, figure, percent, unit_of, words
 
 #: facts of a plan that are told first where there are any, and how many are told in all
@@ -80,7 +80,8 @@ def physics(state: State) -> str:
             ("peak torque", figure(trial.peak_torque, "N m")),
             ("cost of transport", figure(trial.cost_of_transport)),
         ]
-        warned = "".join(f"<p>{esc(text)}</p>" for text in trial.warnings[:WARNINGS])
+        told = [f"The body went {advance_in_words(trial)}."] if went_back(trial) else []
+        warned = "".join(f"<p>{esc(text)}</p>" for text in (*told, *trial.warnings[:WARNINGS]))
         text = f'<p class="good" data-bp="physics"><b>✓ executed</b></p>{_table(rows)}{warned}'
     return f'{_STYLE}<div class="bp">{text}</div>'
 
