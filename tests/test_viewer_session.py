@@ -343,6 +343,82 @@ def test_physics_that_cannot_be_says_why(motion: bp.Motion) -> None:
     bench.session.stop()
 
 
+def test_physics_waits_for_the_plan_in_hand(motion: bp.Motion, monkeypatch: pytest.MonkeyPatch) -> None:
+    executed: list[bp.Motion] = []
+    trial = snake_trial()
+
+    def execute(what: bp.Motion, progress: Callable[[float], None]) -> Any:
+        executed.append(what)
+        return trial
+
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(speed: float) -> bp.Motion:
+        begun.set()
+        assert go.wait(LONG)
+        return motion.replace(facts={"speed": speed})
+
+    bench = Bench(motion, simulate=execute)
+    bench.ask(0.1)
+    bench.idle()
+    bench.calls.clear()
+    bench.answer = slow
+    monkeypatch.setattr(session, "FLUENT", -1.0)  # few times first, then all of them
+    bench.ask(0.2)
+    assert begun.wait(LONG)
+    bench.session.run_physics()
+    state = bench.session.state
+    assert state.physics_waits and state.physics is None and state.planning
+    assert "waits for the plan" in telling.physics(state) and "planning" in telling.verdict(state)
+    go.set()
+    state = bench.idle()
+    assert bench.calls == [(0.2, True), (0.2, False)]  # never the preview
+    assert executed == [state.motion] and state.motion.facts["speed"] == 0.2
+    assert state.trial is trial and not state.physics_waits and not state.preview
+    bench.session.stop()
+
+
+def test_physics_that_waits_can_be_stopped_and_has_no_plan_where_there_is_none(motion: bp.Motion) -> None:
+    executed: list[bp.Motion] = []
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(speed: float) -> bp.Motion:
+        begun.set()
+        assert go.wait(LONG)
+        if speed == 0.3:
+            raise InputError("ground: too steep.")
+        return motion.replace(facts={"speed": speed})
+
+    bench = Bench(motion, simulate=lambda what, progress: executed.append(what))
+    bench.answer = slow
+    for speed in (0.2, 0.3):
+        begun.clear()
+        go.clear()
+        bench.ask(speed)
+        assert begun.wait(LONG)
+        bench.session.run_physics()
+        assert bench.session.state.physics_waits
+        if speed == 0.2:
+            bench.session.cancel_physics()
+            assert not bench.session.state.physics_waits and not bench.session.state.physics_problem
+        go.set()
+        state = bench.idle()
+        assert executed == [] and not state.physics_waits and state.trial is None
+    assert state.physics_problem == "not run: there is no such plan" and state.problem == "ground: too steep."
+    # refused by the gait itself
+    go.clear()
+    begun.clear()
+    bench.ask(0.21)
+    assert begun.wait(LONG)
+    bench.session.run_physics()
+    bench.ask(-1.0)
+    assert not bench.session.state.physics_waits and bench.session.state.physics_problem
+    go.set()
+    bench.idle()
+    assert executed == []
+    bench.session.stop()
+
+
 # --- sources
 
 

@@ -142,10 +142,11 @@ class Panel:
         place.on_update(placed)
 
     def _toggle_physics(self, _event: Any) -> None:
-        if self.session.state.physics is None:
-            self.session.run_physics()
-        else:
+        state = self.session.state
+        if state.physics is not None or state.physics_waits:
             self.session.cancel_physics()
+        else:
+            self.session.run_physics()
 
     def _show_part(self, gui: Any) -> None:
         motion = self.session.source.motion
@@ -214,9 +215,8 @@ class Panel:
         if hasattr(self, "_physics"):
             self._physics.content = telling.physics(state)
         if self._run is not None:
-            running = state.physics is not None
-            self._run.label = "Stop physics" if running else "Run physics"
-            self._run.disabled = not running and (state.planning or state.preview)
+            asked = state.physics is not None or state.physics_waits
+            self._run.label = "Stop physics" if asked else "Run physics"
 
     def at(self, time: float, duration: float, stages: list[str]) -> None:
         """Show a time."""

@@ -64,7 +64,8 @@ class Source:
 class State:
     """What there is to see. ``number`` counts motions and ``trial`` belongs to the ``motion``; ``report``: None while
     it is being checked; ``problem``: why the latest wish has no motion; ``plan_time`` s; ``physics``: part done in [0,
-    1], None where none runs; ``physics_problem``: why there is no trial."""
+    1], None where none runs; ``physics_waits``: it runs as soon as the plan in hand is whole; ``physics_problem``: why
+    there is no trial."""
 
     motion: Motion
     number: int = 0
@@ -76,6 +77,7 @@ class State:
     problem: str = ""
     plan_time: float | None = None
     physics: float | None = None
+    physics_waits: bool = False
     physics_problem: str = ""
 
 
@@ -141,7 +143,7 @@ class Session:
             with self._lock:
                 self._wish += 1
                 self._planner.forget()
-                self._update(planning=False, problem=str(error))
+                self._update(planning=False, problem=str(error), **self._unplanned())
             return
         with self._lock:
             self._wish += 1
@@ -154,18 +156,24 @@ class Session:
             self._update(planning=True)
 
     def run_physics(self) -> None:
-        """Execute the motion at hand in MuJoCo."""
+        """Execute the motion at hand in MuJoCo; while one is being planned, that one, as soon as it is whole."""
         with self._lock:
             state = self._state
-            if self.source.simulate is None or state.planning or state.preview or state.physics is not None:
+            if self.source.simulate is None:
                 return
-            self._stop_physics = threading.Event()
-            self._update(physics=0.0, physics_problem="", trial=None)
-            self._physics.ask((state.motion, state.number))
+            if state.planning or state.preview:
+                self._update(physics_waits=True, physics_problem="")
+            elif state.physics is None:
+                self._stop_physics = threading.Event()
+                self._update(physics=0.0, physics_waits=False, physics_problem="", trial=None)
+                self._physics.ask((state.motion, state.number))
 
     def cancel_physics(self) -> None:
-        """Stop a run of the physics."""
-        self._stop_physics.set()
+        """Stop a run of the physics, and wait for none."""
+        with self._lock:
+            self._stop_physics.set()
+            if self._state.physics_waits:
+                self._update(physics_waits=False)
 
     def idle(self, timeout: float) -> bool:
         """Wait until plans, checks and physics are done; False where that takes longer than ``timeout`` s."""
@@ -241,6 +249,8 @@ class Session:
                 self._planner.ask(replace(wish, preview=False), SETTLED)
             else:
                 self._judge.ask((motion, self._state.number), SETTLED)
+                if self._state.physics_waits:
+                    self.run_physics()
 
     def _refuse(self, problem: str, took: float) -> None:
         """Say why there is no plan, and keep the last good one."""
@@ -249,9 +259,15 @@ class Session:
             self._shown_gait = gait
             self._update(motion=motion, number=self._state.number + 1, preview=False, report=None, trial=None)
         again = self._state.report is None
-        self._update(planning=False, checking=again, problem=problem, plan_time=took)
+        self._update(planning=False, checking=again, problem=problem, plan_time=took, **self._unplanned())
         if again:
             self._judge.ask((motion, self._state.number), SETTLED)
+
+    def _unplanned(self) -> dict[str, Any]:
+        """What is to be said of physics that waited for a plan which there is not."""
+        if not self._state.physics_waits:
+            return {}
+        return {"physics_waits": False, "physics_problem": "not run: there is no such plan"}
 
     def _check(self, job: tuple[Motion, int]) -> None:
         motion, number = job

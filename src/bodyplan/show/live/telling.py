@@ -66,7 +66,9 @@ def numbers(state: State) -> list[tuple[str, str]]:
 
 def physics(state: State) -> str:
     """What the physics say."""
-    if state.physics is not None:
+    if state.physics_waits:
+        text = '<p class="busy" data-bp="physics">waits for the plan …</p>'
+    elif state.physics is not None:
         text = f'<p class="busy" data-bp="physics">executing … {100.0 * state.physics:.0f} %</p>'
     elif state.physics_problem:
         text = f'<p class="bad" data-bp="physics">Physics: {esc(state.physics_problem)}</p>'
