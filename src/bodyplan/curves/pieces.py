@@ -42,6 +42,7 @@ def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: 
     v, vd, vdd = tail[0], tail[1], tail[2]
     out[p, V], out[p, VD], out[p, VDD] = v, vd, vdd
     x = lead + 0.5 * pi / omega
+    known, f, fg, fgg = -1.0, 0.0, 0.0, 0.0
     for k in range(modules + 1):
         g, gd, gdd = gammas[k, 0], gammas[k, 1], gammas[k, 2]
         p += 1
@@ -52,7 +53,9 @@ def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: 
         span = pi / omega
         if rule == NATURAL and g < 1.0:
             span = pi / (omega * sqrt(1.0 - g * g))
-        f, _, _, fg, _, fgg = dynamic_jet(span, g, omega)
+        if g != known:  # modules at rest share their gamma, and so their end
+            f, _, _, fg, _, fgg = dynamic_jet(span, g, omega)
+            known = g
         if head or (rule == CUT and f >= 0.0):
             # correction 3: a module that no longer crosses zero is followed to its own first zero, then y = 0
             p += 1
@@ -74,6 +77,28 @@ def piece_at(x: float, pieces: Array, count: int) -> int:
     while i > 0 and x < pieces[i, START]:
         i -= 1
     return i
+
+
+@njit(cache=True)
+def rests(piece: Array) -> bool:
+    """True where the curve does not change along a piece (kernel)."""
+    return bool(piece[VD] == 0.0 and piece[VDD] == 0.0 and piece[GD] == 0.0 and piece[GDD] == 0.0)
+
+
+@njit(cache=True)
+def rests_until(pieces: Array, count: int, other: Array, others: int) -> float:
+    """x up to which a curve rests and is the same as another one, given by its own pieces; inf if it is all the same
+    (kernel)."""
+    for k in range(min(count, others)):
+        begin = min(pieces[k, START], other[k, START])
+        if pieces[k, START] != other[k, START] or not rests(pieces[k]):
+            return float(begin)
+        for column in (KIND, ORIGIN, V, G):
+            if pieces[k, column] != other[k, column]:
+                return float(begin)
+    if count == others:
+        return np.inf
+    return float(pieces[others, START] if count > others else other[count, START])
 
 
 @njit(cache=True)

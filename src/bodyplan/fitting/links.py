@@ -194,23 +194,27 @@ def _tight(
 
 @njit(cache=True)
 def place_chain(
+    first: int,
     lengths: Array,
-    start: float,
     pieces: Array,
     count: int,
     omega: float,
     nodes: Array,
     weights: Array,
     points: Array,
+    local: Array,
     angles: Array,
 ) -> int:
-    """One chain on one curve (kernel): fills points (n+1, 2) and angles (n,); the first link too tight, or -1."""
-    x = start
+    """One chain on one curve from joint ``first`` on, whose x is points[first, 0] (kernel): fills points (n + 1, 2),
+    local (n + 1, 3) slope and second derivative of the curve there and the piece, and angles (n,); returns the first
+    link too tight of those placed, or -1."""
+    x = points[first, 0]
     k = pc.piece_at(x, pieces, count)
-    y, slope, _ = pc.piece_value(x, pieces[k], omega)
-    points[0, 0], points[0, 1] = x, y
+    y, slope, curve = pc.piece_value(x, pieces[k], omega)
+    points[first, 1] = y
+    local[first, 0], local[first, 1], local[first, 2] = slope, curve, k
     tight = -1
-    for i in range(lengths.size):
+    for i in range(first, lengths.size):
         length = lengths[i]
         steepest = _bounds(pieces[k], omega, y, slope)[0]
         xn = next_joint(x, y, k, steepest, length, pieces, count, omega)
@@ -222,26 +226,28 @@ def place_chain(
                 steepest = max(steepest, abs(pieces[j, pc.V]) * omega)
             if _tight(x, xn, steepest, length, pieces, count, omega, nodes, weights):
                 tight = i
-        yn, slope, _ = pc.piece_value(xn, pieces[k], omega)
+        yn, slope, curve = pc.piece_value(xn, pieces[k], omega)
         angles[i] = atan2(yn - y, xn - x)
         x, y = xn, yn
         points[i + 1, 0], points[i + 1, 1] = x, y
+        local[i + 1, 0], local[i + 1, 1], local[i + 1, 2] = slope, curve, k
     return tight
 
 
 @njit(cache=True)
-def chain_rates(points: Array, pieces: Array, count: int, omega: float, rates: Array) -> None:
-    """First and second derivative of the links' angles by the curve's progress t, (2, n), for joints placed on the
-    curve (kernel). The first joint keeps its x."""
-    x, y = points[0, 0], points[0, 1]
-    k = pc.piece_at(x, pieces, count)
-    _, _, _, yd, _, ydd = pc.piece_jet(x, pieces[k], omega)
+def chain_rates(
+    first: int, points: Array, local: Array, pieces: Array, omega: float, rates: Array
+) -> tuple[float, float]:
+    """First and second derivative of the links' angles by the curve's progress t, (2, n), for joints that
+    :func:`place_chain` put on the curve, of which those up to ``first`` rest (kernel). Returns the last joint's speed
+    and acceleration along x."""
+    x, y = points[first, 0], points[first, 1]
+    _, _, yd, _, ydd = _moving(x, local[first], pieces, omega)
     xd, xdd = 0.0, 0.0
-    for i in range(rates.shape[1]):
+    rates[:, :first] = 0.0
+    for i in range(first, rates.shape[1]):
         xn, yn = points[i + 1, 0], points[i + 1, 1]
-        while k + 1 < count and xn >= pieces[k + 1, pc.START]:
-            k += 1
-        _, yx, yxx, yt, yxt, ytt = pc.piece_jet(xn, pieces[k], omega)
+        yx, yxx, yt, yxt, ytt = _moving(xn, local[i + 1], pieces, omega)
         ux, uy = xn - x, yn - y
         # u . u' = 0 along t, twice: the new joint's speed and acceleration along x
         across = ux + uy * yx
@@ -255,6 +261,17 @@ def chain_rates(points: Array, pieces: Array, count: int, omega: float, rates: A
         rates[0, i] = (ux * vy - uy * vx) / square
         rates[1, i] = (ux * (yndd - ydd) - uy * (xndd - xdd)) / square
         x, y, xd, yd, xdd, ydd = xn, yn, xnd, ynd, xndd, yndd
+    return xd, xdd
+
+
+@njit(cache=True)
+def _moving(x: float, local: Array, pieces: Array, omega: float) -> tuple[float, float, float, float, float]:
+    """y_x, y_xx, y_t, y_xt, y_tt at a joint (kernel)."""
+    piece = pieces[int(local[2])]
+    if pc.rests(piece):
+        return local[0], local[1], 0.0, 0.0, 0.0
+    _, yx, yxx, yt, yxt, ytt = pc.piece_jet(x, piece, omega)
+    return yx, yxx, yt, yxt, ytt
 
 
 #: curves from which on a batch is shared between threads
@@ -277,8 +294,10 @@ def _fit_range(
     tight: IntArray,
 ) -> int:
     """:func:`place_chain` for the curves begin .. end - 1 (kernel)."""
+    local = np.empty((lengths.size + 1, 3))
     for b in range(begin, end):
-        tight[b] = place_chain(lengths, start[b], pieces[b], counts[b], omega, nodes, weights, points[b], angles[b])
+        points[b, 0, 0] = start[b]
+        tight[b] = place_chain(0, lengths, pieces[b], counts[b], omega, nodes, weights, points[b], local, angles[b])
     return 0
 
 

@@ -66,6 +66,7 @@ class ExtensionCycle:
     ) -> None:
         self.sweep, self.lengths, self.waves, self.blend = sweep, lengths, waves, blend
         self.whole = 2.0 * sweep.total
+        self._contracted = sweep.at(np.array([-sweep.total]))[0][0]
         self.span = self.whole / waves
         plain = Clock(np.array([0.0, self.whole]), np.ones(2), self.whole)
         self._sweep_clock = plain
@@ -133,15 +134,13 @@ class ExtensionCycle:
 
     def _sum(self, position: Array) -> tuple[Array, Array, Array]:
         """Angles on the curves themselves: waves add as differences from the contracted body."""
-        contracted = self.sweep.at(np.array([-self.sweep.total]))[0]
-        angles = np.broadcast_to(contracted, (len(position), len(self.lengths))).copy()
-        first, second = np.zeros_like(angles), np.zeros_like(angles)
-        for k in range(self.waves):
-            a, b, c = self._one(np.minimum(position + k * self.span, self.whole))
-            angles += a - contracted
-            first += b
-            second += c
-        return angles, first, second
+        if self.waves == 1:
+            return self._one(position)
+        # one ascending run through all waves: each place of a sweep is found from the one before
+        of_waves = position + self.span * np.arange(self.waves)[:, None]
+        shape = self._one(np.minimum(of_waves, self.whole).ravel())
+        angles, first, second = (x.reshape(self.waves, len(position), -1).sum(axis=0) for x in shape)
+        return angles - (self.waves - 1) * self._contracted, first, second
 
     def _shape(self, position: Array) -> tuple[Array, Array, Array]:
         """Angles and derivatives by position in [0, span], ascending."""

@@ -8,7 +8,9 @@ tail, module 1 .. N_B, head.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -102,60 +104,119 @@ def _ramps(s: float, initial: Array, final: Array, start: Array, duration: Array
         out[i, 2] = reach * f2 / (duration[i] * duration[i])
 
 
-@njit(cache=True)
-def body_at(
-    s: float,
-    ramps: tuple[Array, Array, Array, Array],
-    blend: int,
-    curve: tuple[float, int, int, float],
-    lengths: Array,
-    nodes: Array,
-    weights: Array,
-    parameters: Array,
-    pieces: Array,
-    points: Array,
-    angles: Array,
-    rates: Array,
-) -> tuple[float, float, float, int]:
-    """One chain at one progress (kernel): fills points, angles and their derivatives; returns the extent along x
-    with its two derivatives, and the first link that is too tight or -1."""
-    initial, final, start, duration = ramps
-    omega, crossing, rule, lead = curve
-    _ramps(s, initial, final, start, duration, blend, parameters)
-    count = pc.build_pieces(parameters[0], parameters[1:], omega, crossing, rule, lead, pieces)
-    tight = place_chain(lengths, 0.0, pieces, count, omega, nodes, weights, points, angles)
-    chain_rates(points, pieces, count, omega, rates)
-    extent, first, second = 0.0, 0.0, 0.0
-    for j in range(lengths.size):
-        c, si = np.cos(angles[j]) * lengths[j], np.sin(angles[j]) * lengths[j]
-        extent += c
-        first -= si * rates[0, j]
-        second -= c * rates[0, j] ** 2 + si * rates[1, j]
-    return extent, first, second, tight
+class Chain(NamedTuple):
+    """A :class:`StretchingBody` for kernels: its ramps and its curve; and from ``pieces`` on the body before any stage,
+    whose joints are also those of the stretching body as far as the curve has not changed."""
+
+    initial: Array
+    final: Array
+    start: Array
+    duration: Array
+    blend: int
+    omega: float
+    crossing: int
+    lead: float
+    lengths: Array
+    nodes: Array
+    weights: Array
+    pieces: Array
+    rows: int
+    points: Array
+    local: Array
+    angles: Array
+    tight: int
+
+
+class Scratch(NamedTuple):
+    """What a kernel needs for one chain at one progress: parameters (p, 3), pieces, points (n + 1, 2), local
+    (n + 1, 3), angles (n,), rates (2, n)."""
+
+    parameters: Array
+    pieces: Array
+    points: Array
+    local: Array
+    angles: Array
+    rates: Array
 
 
 @njit(cache=True)
-def _bodies(
-    progress: Array,
-    ramps: tuple[Array, Array, Array, Array],
-    blend: int,
-    curve: tuple[float, int, int, float],
-    lengths: Array,
-    nodes: Array,
-    weights: Array,
-    angles: Array,
-    rates: Array,
-    extents: Array,
-    tight: IntArray,
-) -> None:
-    parameters = np.empty((ramps[0].size, 3))
-    pieces = np.empty((ramps[0].size + 2, pc.COLUMNS))
-    points = np.empty((lengths.size + 1, 2))
+def scratch_of(chain: Chain) -> Scratch:
+    """Room for :func:`body_at` (kernel)."""
+    n, p = chain.lengths.size, chain.initial.size
+    return Scratch(
+        np.empty((p, 3)),
+        np.empty((p + 2, pc.COLUMNS)),
+        np.empty((n + 1, 2)),
+        np.empty((n + 1, 3)),
+        np.empty(n),
+        np.empty((2, n)),
+    )
+
+
+@njit(cache=True)
+def body_at(s: float, chain: Chain, at: Scratch) -> tuple[float, float, float, int]:
+    """One chain at one progress (kernel): fills ``at``; returns the extent along x with its two derivatives, and the
+    first link that is too tight or -1."""
+    n = chain.lengths.size
+    _ramps(s, chain.initial, chain.final, chain.start, chain.duration, chain.blend, at.parameters)
+    count = pc.build_pieces(
+        at.parameters[0], at.parameters[1:], chain.omega, chain.crossing, pc.CUT, chain.lead, at.pieces
+    )
+    same = pc.rests_until(at.pieces, count, chain.pieces, chain.rows)
+    first = 0
+    while first < n and chain.points[first + 1, 0] <= same:
+        first += 1
+    for j in range(first + 1):
+        at.points[j, 0], at.points[j, 1] = chain.points[j, 0], chain.points[j, 1]
+        at.local[j, :] = chain.local[j]
+    at.angles[:first] = chain.angles[:first]
+    tight = place_chain(
+        first,
+        chain.lengths,
+        at.pieces,
+        count,
+        chain.omega,
+        chain.nodes,
+        chain.weights,
+        at.points,
+        at.local,
+        at.angles,
+    )
+    if 0 <= chain.tight < first:
+        tight = chain.tight
+    speed, acceleration = chain_rates(first, at.points, at.local, at.pieces, chain.omega, at.rates)
+    return at.points[n, 0] - at.points[0, 0], speed, acceleration, tight
+
+
+@njit(cache=True)
+def _rest(chain: Chain) -> tuple[int, int]:
+    """Fills the chain's ``pieces``, ``points``, ``local`` and ``angles`` with the body before any stage; returns their
+    number of rows and the first link that is too tight or -1 (kernel)."""
+    still = np.zeros((chain.initial.size, 3))
+    still[:, 0] = chain.initial
+    count = pc.build_pieces(still[0], still[1:], chain.omega, chain.crossing, pc.CUT, chain.lead, chain.pieces)
+    tight = place_chain(
+        0,
+        chain.lengths,
+        chain.pieces,
+        count,
+        chain.omega,
+        chain.nodes,
+        chain.weights,
+        chain.points,
+        chain.local,
+        chain.angles,
+    )
+    return count, tight
+
+
+@njit(cache=True)
+def _bodies(progress: Array, chain: Chain, angles: Array, rates: Array, extents: Array, tight: IntArray) -> None:
+    at = scratch_of(chain)
     for i in range(progress.size):
-        e0, e1, e2, tight[i] = body_at(
-            progress[i], ramps, blend, curve, lengths, nodes, weights, parameters, pieces, points, angles[i], rates[i]
-        )
+        e0, e1, e2, tight[i] = body_at(progress[i], chain, at)
         extents[i, 0], extents[i, 1], extents[i, 2] = e0, e1, e2
+        angles[i], rates[i] = at.angles, at.rates
 
 
 @dataclass(frozen=True)
@@ -185,23 +246,35 @@ class StretchingBody:
         n = len(self.lengths)
         angles, rates = np.empty((s.size, n)), np.empty((s.size, 2, n))
         extents, tight = np.empty((s.size, 3)), np.empty(s.size, dtype=np.int64)
-        _bodies(s, *self.kernel_arguments, angles, rates, extents, tight)
+        _bodies(s, self.chain, angles, rates, extents, tight)
         return Bodies(angles, rates, extents, tight)
 
-    @property
-    def kernel_arguments(
-        self,
-    ) -> tuple[tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array]:
-        """Leading arguments of the kernels after progress."""
-        st = self.stages
-        return (
-            (st.initial, st.final, st.start, st.duration),
+    @cached_property
+    def chain(self) -> Chain:
+        """The body as kernels take it."""
+        st, lengths = self.stages, np.ascontiguousarray(self.lengths, dtype=np.float64)
+        n, p = lengths.size, len(st.names)
+        whole = Chain(
+            st.initial,
+            st.final,
+            st.start,
+            st.duration,
             BLENDS[st.blend],
-            (self.omega, self.crossing, pc.CUT, self.lead),
-            np.ascontiguousarray(self.lengths),
+            float(self.omega),
+            self.crossing,
+            float(self.lead),
+            lengths,
             GAUSS_NODES,
             GAUSS_WEIGHTS,
+            pieces=np.zeros((p + 2, pc.COLUMNS)),
+            rows=0,  # nothing is known to rest yet
+            points=np.zeros((n + 1, 2)),
+            local=np.zeros((n + 1, 3)),
+            angles=np.zeros(n),
+            tight=-1,
         )
+        count, tight = _rest(whole)
+        return whole._replace(rows=count, tight=tight)
 
     def curve(self, progress: Array) -> ConcertinaCurve:
         """The body curves at progress (S,), a batch."""

@@ -20,9 +20,8 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array
-from bodyplan.curves import pieces as pc
 from bodyplan.errors import InputError
-from bodyplan.gaits.stretching import StretchingBody, body_at
+from bodyplan.gaits.stretching import Chain, StretchingBody, body_at, scratch_of
 
 
 @dataclass(frozen=True)
@@ -52,27 +51,17 @@ class Sweep(Protocol):
         ...
 
 
+#: progress to which the two chains of a transit are brought together; what is left is corrected to second order
+CLOSE = 1e-11
+
+
 @njit(cache=True)
-def _progress_at(
-    target: float,
-    low: float,
-    high: float,
-    ramps: tuple[Array, Array, Array, Array],
-    blend: int,
-    curve: tuple[float, int, int, float],
-    lengths: Array,
-    nodes: Array,
-    weights: Array,
-) -> float:
+def _progress_at(target: float, low: float, high: float, chain: Chain) -> float:
     """Progress in [low, high] at which the extent, which grows, is ``target``: Newton inside a shrinking bracket."""
-    parameters = np.empty((ramps[0].size, 3))
-    pieces = np.empty((ramps[0].size + 2, pc.COLUMNS))
-    points, angles, rates = np.empty((lengths.size + 1, 2)), np.empty(lengths.size), np.empty((2, lengths.size))
+    at = scratch_of(chain)
     s = 0.5 * (low + high)
     for _ in range(200):
-        e, e1, _, _ = body_at(
-            s, ramps, blend, curve, lengths, nodes, weights, parameters, pieces, points, angles, rates
-        )
+        e, e1, _, _ = body_at(s, chain, at)
         if e < target:
             low = s
         else:
@@ -87,67 +76,105 @@ def _progress_at(
 
 
 @njit(cache=True)
-def _transit(
+def _ahead(u: float, before: Array, last: Array) -> float:
+    """s at u, from u, s, s' and s'' at one or two places before (kernel): the quintic through both, where the second
+    is not much nearer to u than to the first; else a parabola."""
+    h, k = u - last[0], last[0] - before[0]
+    if not 0.0 < h <= 2.0 * k:  # also where there is only one (nan)
+        return float(last[1] + h * (last[2] + 0.5 * h * last[3]))
+    # Taylor's terms from the last place; third to fifth order meet the place before
+    d0 = (before[1] - (last[1] - k * (last[2] - 0.5 * k * last[3]))) / (k * k * k)
+    d1 = (before[2] - (last[2] - k * last[3])) / (k * k)
+    d2 = (before[3] - last[3]) / k
+    # -c3 + c4 - c5 = d0, 3 c3 - 4 c4 + 5 c5 = d1, -6 c3 + 12 c4 - 20 c5 = d2 with c in units of k
+    c3 = -10.0 * d0 - 4.0 * d1 - 0.5 * d2
+    c4 = -15.0 * d0 - 7.0 * d1 - d2
+    c5 = -6.0 * d0 - 3.0 * d1 - 0.5 * d2
+    x = h / k
+    return float(last[1] + h * (last[2] + 0.5 * h * last[3]) + k * k * k * x**3 * (c3 + x * (c4 + x * c5)))
+
+
+@njit(cache=True)
+def _sweep(
     u: Array,
+    launch_end: float,
+    landing_start: float,
+    s_launch: float,
+    r_landing: float,
+    total: float,
     target: float,
-    lows: Array,
-    highs: Array,
-    front: tuple[tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array],
-    back: tuple[tuple[Array, Array, Array, Array], int, tuple[float, int, int, float], Array, Array, Array],
-    out: Array,
+    sign: float,
+    front: Chain,
+    back: Chain,
+    angles: Array,
+    first: Array,
+    second: Array,
+    progress: Array,
 ) -> None:
-    """s for each u of a transit: gain(s) + gain(s - u) = target; warm-started along ascending u."""
-    n = front[3].size
-    parameters = np.empty((front[0][0].size, 3))
-    pieces = np.empty((front[0][0].size + 2, pc.COLUMNS))
-    points, angles, rates = np.empty((n + 1, 2)), np.empty(n), np.empty((2, n))
-    s = 0.5 * (lows[0] + highs[0]) if u.size else 0.0
+    """Angles and derivatives of the sweep at ascending u, and s and r (kernel).
+
+    In transit s is a root of gain(s) + gain(s - u) = target, found by Newton in a bracket that shrinks, from a
+    prediction by the places before it. The bodies of its last evaluation are the result.
+    """
+    n = front.lengths.size
+    a, b = scratch_of(front), scratch_of(back)
+    a_at, b_at = np.nan, np.nan  # progress of what they hold
+    before, last = np.full(4, np.nan), np.full(4, np.nan)
     for i in range(u.size):
-        low, high = lows[i], highs[i]
-        if not low < s < high:
-            s = 0.5 * (low + high)
-        for _ in range(200):
-            a, a1, _, _ = body_at(
-                s,
-                front[0],
-                front[1],
-                front[2],
-                front[3],
-                front[4],
-                front[5],
-                parameters,
-                pieces,
-                points,
-                angles,
-                rates,
-            )
-            b, b1, _, _ = body_at(
-                s - u[i],
-                back[0],
-                back[1],
-                back[2],
-                back[3],
-                back[4],
-                back[5],
-                parameters,
-                pieces,
-                points,
-                angles,
-                rates,
-            )
-            miss, slope = a + b - target, a1 + b1
-            if miss < 0.0:
-                low = s
-            else:
-                high = s
-            following = s - miss / slope if slope > 0.0 else low
-            if not low < following < high:
-                following = 0.5 * (low + high)
-            done = abs(following - s) <= 1e-14 * (1.0 + abs(s)) or high - low <= 1e-15
-            s = following
-            if done:
-                break
-        out[i] = s
+        moving = launch_end < u[i] < landing_start
+        slip = 0.0
+        if not moving:
+            s = u[i] + total if u[i] <= launch_end else total
+            s = min(max(s, 0.0), total)
+            r = min(max(s - u[i], 0.0), total)
+            if s != a_at:
+                body_at(s, front, a)
+                a_at = s
+            if r != b_at:
+                body_at(r, back, b)
+                b_at = r
+            s1, s2 = 1.0 if u[i] < landing_start else 0.0, 0.0
+        else:
+            low, high = max(s_launch, u[i] + r_landing), min(total, u[i] + total)
+            s = _ahead(u[i], before, last)
+            if not low < s < high:
+                s = 0.5 * (low + high)
+            for _ in range(200):
+                e, a1, a2, _ = body_at(s, front, a)
+                f, b1, b2, _ = body_at(s - u[i], back, b)
+                miss, slope = e + f - target, a1 + b1
+                if miss < 0.0:
+                    low = s
+                else:
+                    high = s
+                slip = -miss / slope if slope > 0.0 else low - s
+                # a miss of rounding is none: where the gains stand still, s cannot be told better
+                if abs(slip) <= CLOSE or abs(miss) <= 4e-16 * target or high - low <= 1e-15:
+                    break
+                following = s + slip
+                if not low < following < high:
+                    following = 0.5 * (low + high)
+                if following == s:
+                    break
+                s = following
+            if slope <= 0.0 or abs(slip) > CLOSE:
+                slip = 0.0
+            a_at, b_at = np.nan, np.nan
+            # gain'(s) s' + gain'(r) r' = 0 with s' - r' = 1
+            s1, s2 = (b1 / slope, 0.0) if slope > 0.0 else (0.5, 0.0)
+            both = slope if slope > 0.0 else 1.0
+            s2 = (b2 * (s1 - 1.0) * a1 - b1 * a2 * s1) / both**2
+            r = s - u[i]
+            before[:] = last
+            last[0], last[1], last[2], last[3] = u[i], s + slip, s1, s2
+        r1 = s1 - 1.0
+        progress[i, 0], progress[i, 1] = s + slip, r + slip
+        for j in range(n):
+            k = n - 1 - j
+            a1j, a2j, b1j, b2j = a.rates[0, j], a.rates[1, j], sign * b.rates[0, k], sign * b.rates[1, k]
+            angles[i, j] = a.angles[j] + sign * b.angles[k] + slip * (a1j + b1j)
+            first[i, j] = (a1j + slip * a2j) * s1 + (b1j + slip * b2j) * r1
+            second[i, j] = a2j * s1 * s1 + b2j * r1 * r1 + (a1j + b1j) * s2
 
 
 class ExtensionSweep:
@@ -182,7 +209,7 @@ class ExtensionSweep:
         self.windows = self._windows()
 
     def _invert(self, body: StretchingBody, extent: float) -> float:
-        return float(_progress_at(extent, 0.0, self.total, *body.kernel_arguments))
+        return float(_progress_at(extent, 0.0, self.total, body.chain))
 
     def _u_at(self, progress: float, stretching: bool) -> float:
         """u at which s (or r) passes a given progress."""
@@ -209,43 +236,34 @@ class ExtensionSweep:
 
     def progress(self, u: Array) -> tuple[Array, Array]:
         """s (S,) and r (S,) for ascending u (S,) in [-T, T]."""
-        total = self.total
-        s = np.where(u <= self.launch_end, u + total, total)
-        moving = (u > self.launch_end) & (u < self.landing_start)
-        if moving.any():
-            inner = np.ascontiguousarray(u[moving])
-            found = np.empty_like(inner)
-            lows = np.maximum(self.s_launch, inner + self.r_landing)
-            highs = np.minimum(total, inner + total)
-            arguments = self.front.kernel_arguments, self.back.kernel_arguments
-            _transit(inner, self.target, lows, highs, *arguments, found)
-            s[moving] = found
-        return np.clip(s, 0.0, total), np.clip(s - u, 0.0, total)
+        both = self._at(u)[3]
+        return both[:, 0], both[:, 1]
 
     def at(self, u: Array) -> tuple[Array, Array, Array]:
         """Angles (S, n) and their first and second derivatives by u, for ascending u (S,) in [-T, T]."""
-        u = np.asarray(u, dtype=np.float64)
-        s, r = self.progress(u)
-        a, b = self.front.at(s), self.back.at(r)
-        a1, a2 = a.extents[:, 1], a.extents[:, 2]
-        b1, b2 = b.extents[:, 1], b.extents[:, 2]
-        moving = (u > self.launch_end) & (u < self.landing_start)
-        both = np.where(a1 + b1 > 0.0, a1 + b1, 1.0)
-        # launch: s' = 1; landing: r' = -1; transit: gain'(s) s' + gain'(r) r' = 0 with s' - r' = 1
-        s1 = np.where(moving, np.where(a1 + b1 > 0.0, b1 / both, 0.5), np.where(u < self.landing_start, 1.0, 0.0))
-        if self.launch_end >= self.landing_start:
-            s1 = np.where(u < self.landing_start, 1.0, 0.0)
-        r1 = s1 - 1.0
-        s2 = np.where(moving, (b2 * r1 * a1 - b1 * a2 * s1) / both**2, 0.0)
-        flip = self.sign
-        angles = a.angles + flip * b.angles[:, ::-1]
-        first = a.rates[:, 0] * s1[:, None] + flip * b.rates[:, 0, ::-1] * r1[:, None]
-        second = (
-            a.rates[:, 1] * (s1**2)[:, None]
-            + a.rates[:, 0] * s2[:, None]
-            + flip * (b.rates[:, 1, ::-1] * (r1**2)[:, None] + b.rates[:, 0, ::-1] * s2[:, None])
+        return self._at(u)[:3]
+
+    def _at(self, u: Array) -> tuple[Array, Array, Array, Array]:
+        u = np.ascontiguousarray(u, dtype=np.float64)
+        angles, first, second = np.empty((3, u.size, len(self.front.lengths)))
+        progress = np.empty((u.size, 2))
+        _sweep(
+            u,
+            self.launch_end,
+            self.landing_start,
+            self.s_launch,
+            self.r_landing,
+            self.total,
+            self.target,
+            self.sign,
+            self.front.chain,
+            self.back.chain,
+            angles,
+            first,
+            second,
+            progress,
         )
-        return angles, first, second
+        return angles, first, second, progress
 
 
 class LiteralSweep:
