@@ -210,6 +210,39 @@ def test_feet_in_one_line_and_feet_inside() -> None:
     assert np.array_equal(twice.edges[:4], got.edges[:4])
 
 
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.integers(3, 6))
+def test_feet_in_one_line_carry_on_it_alone(seed: int, count: int) -> None:
+    """Any line, any gravity: the way of the centre of mass to what is between the feet, seen along gravity; beyond an
+    end the robot turns about that foot."""
+    rng = np.random.default_rng(seed)
+    start, way, gravity = rng.normal(size=3), rng.normal(size=3), rng.normal(size=3)
+    g = gravity / np.linalg.norm(gravity)
+    feet = start + rng.permutation(np.append(rng.uniform(size=count - 2), [0.0, 1.0]))[:, None] * way
+    level = way - (way @ g) * g
+    length = float(np.linalg.norm(level))
+    x, y = level / length, np.cross(g, level / length)
+    along, across, height = rng.uniform(-1.0, 2.0) * length, rng.choice([0.0, rng.normal()]), rng.uniform(0.2, 2.0)
+    com = start + along * x + across * y - height * g
+    got = tip_margins(feet, gravity, com)
+    assert got.count == 2
+    beyond = max(-along, 0.0, along - length)
+    away = np.hypot(beyond, across)
+    assert got.min_distance == pytest.approx(-away, abs=1e-12)
+    assert not got.stable or away < 1e-12
+    if beyond > 0.0:
+        below = height if along < 0.0 else height + way @ g  # the foot it tips over, below the centre of mass
+        assert got.min_mu == pytest.approx(-away / np.hypot(away, below), abs=1e-12)
+        assert got.min_angle == pytest.approx(-np.arctan2(away, abs(below)), abs=1e-12)
+    h = 1e-6
+    for kind in ("min_mu", "barrier") if across else ():  # on the line itself edges change sides
+        psi = Objective(kind, k2=0.0, k3=0.0, sharpness=9.0, relax=0.05)
+        by = [(psi(feet, com + h * e, gravity=gravity).value - psi(feet, com - h * e, gravity=gravity).value) / (2 * h)
+              for e in np.eye(3)]  # fmt: skip
+        at = psi(feet, com, gravity=gravity)
+        assert np.abs(by - at.com).max() < 1e-5 * (1.0 + np.abs(at.feet).max())
+
+
 def test_a_centre_of_mass_on_an_edge() -> None:
     feet = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0]])
     got = tip_margins(feet, G, [0.2, 0.0, 0.0])

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, BoolArray, IntArray, finite
 from bodyplan.errors import InputError
-from bodyplan.solve.stability.hull import support_hull
+from bodyplan.spatial.hulls import support_hull
 
 DOWN = (0.0, 0.0, -1.0)
 
@@ -29,6 +29,11 @@ class Margins:
     * ``distance`` (..., m) m: of the centre of mass from the edge, both projected along gravity.
 
     All three are > 0 where the centre of mass is inside of the edge, < 0 outside, and have the same sign.
+
+    Feet in one line have an edge there and one back, with nothing inside. Where the centre of mass is beyond an end of
+    the line the robot tips over that foot alone: the edge that it has left, or both, then count the way to the foot,
+    and the turn about the level line through the foot across that way. So ``min_distance`` is 0 above the line between
+    the feet and minus the distance from it elsewhere.
     """
 
     edges: IntArray
@@ -66,7 +71,8 @@ class Margins:
 
 class Edges(NamedTuple):
     """The edges of a hull: ``feet`` (..., m, 2) with -1 for none, ``real`` (..., m), ``number`` (...); their ends seen
-    from the centre of mass, ``a`` and ``b`` (..., m, 3) m, and unit gravity ``g`` (..., 3)."""
+    from the centre of mass, ``a`` and ``b`` (..., m, 3) m, and unit gravity ``g`` (..., 3). ``over`` (..., m): 1 or 2
+    where feet are in one line and the robot tips over the end a or b alone, else 0."""
 
     feet: IntArray
     real: BoolArray
@@ -74,6 +80,12 @@ class Edges(NamedTuple):
     a: Array
     b: Array
     g: Array
+    over: IntArray
+
+    @property
+    def ends(self) -> tuple[BoolArray, Array]:
+        """(``over`` > 0 (..., m, 1), the end that it names (..., m, 3))."""
+        return self.over[..., None] > 0, np.where(self.over[..., None] == 2, self.b, self.a)
 
 
 def tip_margins(feet: ArrayLike, gravity: ArrayLike = DOWN, com: ArrayLike = (0.0, 0.0, 0.0)) -> Margins:
@@ -108,7 +120,8 @@ def hull_edges(feet: ArrayLike, gravity: ArrayLike, com: ArrayLike) -> Edges:
     # from the centre of mass, so that robots far from the origin lose nothing
     w = np.broadcast_to(points - c[..., None, :], (*shape, *points.shape[-2:]))
     right, up = _across(g)
-    corners, count = support_hull(*(np.einsum("...mk,...k->...m", w, axis) for axis in (right, up)))
+    size = np.abs(points).max(axis=(-1, -2), initial=0.0) + np.abs(c).max(axis=-1, initial=0.0)
+    corners, count = support_hull(*(np.einsum("...mk,...k->...m", w, axis) for axis in (right, up)), size)
     if np.any(count < 2):
         where = tuple(int(i) for i in np.argwhere(count < 2)[0])
         raise InputError(f"feet: at {where} all lie on one line along gravity: there is no edge to tip over.")
@@ -118,7 +131,24 @@ def hull_edges(feet: ArrayLike, gravity: ArrayLike, com: ArrayLike) -> Edges:
     )
     feet_of = np.where(real[..., None], np.stack([corners, after], axis=-1), -1)
     a, b = (np.take_along_axis(w, np.maximum(feet_of[..., k, None], 0), axis=-2) for k in (0, 1))
-    return Edges(feet_of, real, count, a, b, g)
+    return Edges(feet_of, real, count, a, b, g, _ends(a, b, g, count))
+
+
+def _ends(a: Array, b: Array, g: Array, count: IntArray) -> IntArray:
+    """``over`` of :class:`Edges`."""
+    out = np.zeros(a.shape[:-1], dtype=np.int64)
+    rows = np.flatnonzero(np.ravel(count) == 2)
+    if not len(rows):
+        return out
+    a, b = (p.reshape(-1, *p.shape[-2:])[rows, :2] for p in (a, b))
+    g = g.reshape(-1, 1, 3)[rows]
+    a, b = (p - np.sum(p * g, axis=-1, keepdims=True) * g for p in (a, b))
+    e = b - a
+    across = np.sum(np.cross(a, e) * g, axis=-1)
+    left = across <= across[:, ::-1]  # of the two edges one at least, whatever is rounded
+    before, behind = np.sum(a * e, axis=-1) > 0.0, np.sum(b * e, axis=-1) < 0.0
+    out.reshape(-1, out.shape[-1])[rows, :2] = np.where(left & before, 1, np.where(left & behind, 2, 0))
+    return out
 
 
 def margins(edges: Edges) -> Margins:
@@ -141,7 +171,8 @@ class Measure(NamedTuple):
 def measure_mu(edges: Edges) -> Measure:
     """mu_j = g . s_j, s_j = w_j x w_j+1 / |w_j x w_j+1|. With c the product, d mu = (g - mu s) . dc / |c|.
 
-    For a centre of mass on the line of the edge no plane is defined: 0.
+    For a centre of mass on the line of the edge no plane is defined: 0. Over an end p alone, mu is
+    -|p - (g . p) g| / |p|.
     """
     g = edges.g[..., None, :]
     c = np.cross(edges.a, edges.b)
@@ -150,12 +181,20 @@ def measure_mu(edges: Edges) -> Measure:
     safe = np.where(some, length, 1.0)
     mu = np.where(some, np.sum(c * g, axis=-1, keepdims=True) / safe, 0.0)
     u = np.where(some, (g - mu * c / safe) / safe, 0.0)
-    return Measure(mu[..., 0], np.cross(edges.b, u), np.cross(u, edges.a))
+    value, by_a, by_b = mu, np.cross(edges.b, u), np.cross(u, edges.a)
+    if np.any(edges.over):
+        over, p = edges.ends
+        away, unit = _level(p, g)
+        far = np.where(over, np.linalg.norm(p, axis=-1, keepdims=True), 1.0)
+        by_p = away * p / far**3 - unit / far
+        value = np.where(over, -away / far, value)
+        by_a, by_b = _by_ends(edges, by_p, by_a, by_b)
+    return Measure(value[..., 0], by_a, by_b)
 
 
 def measure_distance(edges: Edges) -> Measure:
     """Distance from the centre of mass to the edges, projected along gravity: g . (a x b) / |e - (e . g) g| with
-    e = b - a."""
+    e = b - a. Over an end p alone, -|p - (g . p) g|."""
     g = edges.g[..., None, :]
     e = edges.b - edges.a
     e = e - np.sum(e * g, axis=-1, keepdims=True) * g
@@ -167,7 +206,28 @@ def measure_distance(edges: Edges) -> Measure:
     distance = np.where(some, np.sum(np.cross(edges.a, e) * g, axis=-1, keepdims=True), 0.0)
     by_a = np.where(some, (np.cross(edges.b, g) + distance * e) / safe, 0.0)
     by_b = np.where(some, (np.cross(g, edges.a) - distance * e) / safe, 0.0)
+    if np.any(edges.over):
+        over, p = edges.ends
+        away, unit = _level(p, g)
+        distance = np.where(over, -away, distance)
+        by_a, by_b = _by_ends(edges, -unit, by_a, by_b)
     return Measure(distance[..., 0], by_a, by_b)
+
+
+def _level(p: Array, g: Array) -> tuple[Array, Array]:
+    """(size (..., 1), direction (..., 3)) of the part of p across g."""
+    level = p - np.sum(p * g, axis=-1, keepdims=True) * g
+    size = np.linalg.norm(level, axis=-1, keepdims=True)
+    return size, level / np.where(size > 0.0, size, 1.0)
+
+
+def _by_ends(edges: Edges, by_p: Array, by_a: Array, by_b: Array) -> tuple[Array, Array]:
+    """Derivatives by the ends of all edges, ``by_p`` (..., m, 3) by the one end of those that are left over it."""
+    over = edges.over[..., None]
+    return (
+        np.where(over == 0, by_a, np.where(over == 1, by_p, 0.0)),
+        np.where(over == 0, by_b, np.where(over == 2, by_p, 0.0)),
+    )
 
 
 def _angle(edges: Edges) -> Array:
@@ -177,7 +237,13 @@ def _angle(edges: Edges) -> Array:
     g = edges.g[..., None, :] - np.sum(edges.g[..., None, :] * e, axis=-1, keepdims=True) * e
     # from the edge to the centre of mass, perpendicular to the edge
     r = np.sum(edges.a * e, axis=-1, keepdims=True) * e - edges.a
-    return np.asarray(np.arctan2(np.sum(np.cross(g, r) * -e, axis=-1), np.abs(np.sum(g * r, axis=-1))))
+    out = np.arctan2(np.sum(np.cross(g, r) * -e, axis=-1), np.abs(np.sum(g * r, axis=-1)))
+    if np.any(edges.over):
+        over, p = edges.ends
+        down = edges.g[..., None, :]
+        away = _level(p, down)[0][..., 0]
+        out = np.where(over[..., 0], -np.arctan2(away, np.abs(np.sum(p * down, axis=-1))), out)
+    return np.asarray(out)
 
 
 def _across(g: Array) -> tuple[Array, Array]:
