@@ -121,7 +121,8 @@ def hull_edges(feet: ArrayLike, gravity: ArrayLike, com: ArrayLike) -> Edges:
     w = np.broadcast_to(points - c[..., None, :], (*shape, *points.shape[-2:]))
     right, up = _across(g)
     size = np.abs(points).max(axis=(-1, -2), initial=0.0) + np.abs(c).max(axis=-1, initial=0.0)
-    corners, count = support_hull(*(np.einsum("...mk,...k->...m", w, axis) for axis in (right, up)), size)
+    u, v = (np.einsum("...mk,...k->...m", w, axis) for axis in (right, up))
+    corners, count = support_hull(u, v, size)
     if np.any(count < 2):
         where = tuple(int(i) for i in np.argwhere(count < 2)[0])
         raise InputError(f"feet: at {where} all lie on one line along gravity: there is no edge to tip over.")
@@ -136,7 +137,7 @@ def hull_edges(feet: ArrayLike, gravity: ArrayLike, com: ArrayLike) -> Edges:
 
 def _ends(a: Array, b: Array, g: Array, count: IntArray) -> IntArray:
     """``over`` of :class:`Edges`."""
-    out = np.zeros(a.shape[:-1], dtype=np.int64)
+    out: IntArray = np.zeros(a.shape[:-1], dtype=np.int64)
     rows = np.flatnonzero(np.ravel(count) == 2)
     if not len(rows):
         return out
@@ -147,7 +148,8 @@ def _ends(a: Array, b: Array, g: Array, count: IntArray) -> IntArray:
     across = np.sum(np.cross(a, e) * g, axis=-1)
     left = across <= across[:, ::-1]  # of the two edges one at least, whatever is rounded
     before, behind = np.sum(a * e, axis=-1) > 0.0, np.sum(b * e, axis=-1) < 0.0
-    out.reshape(-1, out.shape[-1])[rows, :2] = np.where(left & before, 1, np.where(left & behind, 2, 0))
+    flat: IntArray = out.reshape(-1, out.shape[-1])
+    flat[rows, :2] = np.where(left & before, 1, np.where(left & behind, 2, 0))
     return out
 
 
