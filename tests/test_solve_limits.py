@@ -15,8 +15,10 @@ from scipy.optimize import linprog, nnls
 
 import bodyplan as bp
 from bodyplan.errors import InputError, MissingExtraError, SolveError, UnknownNameError
+from bodyplan.robot.masses import center_of_mass
 from bodyplan.solve.limits import inequalities
 from bodyplan.solve.quadratic import nearest
+from bodyplan.solve.stability import tip_margins
 from solve_cases import LEGS, crouching
 
 Limits, Metric, resolve = bp.solve.Limits, bp.solve.Metric, bp.solve.resolve
@@ -243,6 +245,84 @@ def test_reach_stops_a_body_before_its_legs_are_stretched() -> None:
     assert (moved[1] - moved[0]) / (2 * h) == pytest.approx(0.02, abs=1e-9)
 
 
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["mass", "base", (0.03, -0.02, 0.05)]))
+def test_rates_of_the_margins_are_differences(seed: int, com: Any) -> None:
+    """Robots that slide, swing a leg and turn, by small steps of their own motion."""
+    rng = np.random.default_rng(seed)
+    part = walking(seed % 100, known=["fl.foot.v", "fr.foot", "hl.foot.v", "hr.knee"])
+    model, gravity = part.model, (0.2, -0.1, -1.0)
+    stance = [list(LEGS), ["hr", "fl", "hl"]][seed % 2]
+    X = resolve(part, rng.normal(size=len(part.known)), rho=rng.normal(size=len(part.unknown)))
+    limits = Limits(joints=False, rates=False, margin=0.01, stance=stance, com=com, gravity=gravity, horizon=0.5)
+    rows = inequalities(part, limits)
+    assert rows.labels[0].startswith("lower margin over ")
+
+    def distances(step: float) -> dict[tuple[str, str], float]:
+        twist = step * X.twist
+        turned = bp.spatial.multiply(model.base[3:], bp.spatial.quaternion_exp(twist[3:]))
+        base = np.concatenate([model.base[:3] + bp.spatial.rotate(model.base[3:], twist[:3]), turned])
+        moved = model.at(model.q + step * X.qd, base)
+        feet = moved.positions[[model.feet.index(f"{leg}.foot") for leg in stance]]
+        center = center_of_mass(model.robot, moved.q) if com == "mass" else np.zeros(3) if com == "base" else com
+        place = base[:3] + bp.spatial.rotate(base[3:], np.array(center))
+        got = tip_margins(feet, gravity, place)
+        return {(stance[i], stance[j]): got.distance[k] for k, (i, j) in enumerate(got.edges[: got.count])}
+
+    now, before, after = distances(0.0), distances(-1e-6), distances(1e-6)
+    rate = rows.C @ X.X + rows.D @ X.Y
+    assert len(now) == len(rows.labels)
+    for label, C, h in zip(rows.labels, rate, rows.h, strict=True):
+        edge = next(e for e in now if label == f"lower margin over {e[0]}.foot-{e[1]}.foot")
+        assert h == pytest.approx((now[edge] - 0.01) / 0.5, abs=1e-12)
+        assert (before[edge] - after[edge]) / 2e-6 == pytest.approx(C, abs=1e-6 * (1.0 + abs(C)))
+
+
+def test_the_centre_of_mass_is_held_inside_of_its_feet() -> None:
+    """Pushed towards an edge, steps of half a horizon halve the way that is left to the bound."""
+    robot = bp.silo4()
+    q, base = crouching(robot), np.array([0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0])
+    stance = ["fl", "fr", "hl"]
+    known = [*(f"{leg}.foot.v" for leg in LEGS), "body.z", "body.roll", "body.pitch", "body.yaw"]
+    part = bp.solve.partition(robot, q, base, known=known, axes="world")
+    limits = Limits(joints=False, rates=False, margin=0.02, stance=stance, com="base", horizon=0.1)
+    feet = part.model.positions[[part.model.feet.index(f"{leg}.foot") for leg in stance]]
+    gaps = [float(tip_margins(feet, com=base[:3]).min_distance) - 0.02]
+    assert gaps[0] < 0.0  # on the diagonal: it has to come back first
+    for _ in range(4):
+        rates = resolve(part, dict.fromkeys(known, 0.0), rho={"body.x": -2.0, "body.y": -2.0}, limits=limits)
+        assert rates.status == "ok" and rates.residual < 1e-11
+        assert [n for n, pushes in zip(rates.limits, rates.pushing, strict=True) if pushes]
+        q = q + 0.05 * rates.qd
+        base[:3] += 0.05 * rates.twist[:3]
+        part = part.at(q, base)
+        gaps.append(float(tip_margins(feet, com=base[:3]).min_distance) - 0.02)
+    assert gaps[1] == pytest.approx(0.5 * gaps[0], abs=1e-15)
+    assert np.abs(np.divide(gaps[2:], gaps[1:-1]) - 0.5).max() < 1e-3  # joints that step so far move feet a little
+    # within the bound and not pushed: as without it
+    free = Limits(joints=False, rates=False, margin=-1.0, stance=stance, com="base")
+    plain = resolve(part, dict.fromkeys(known, 0.0), rho={"body.x": 0.01}, method="weighted")
+    assert np.array_equal(resolve(part, dict.fromkeys(known, 0.0), rho={"body.x": 0.01}, limits=free).X, plain.X)
+
+
+def test_a_margin_that_cannot_be_kept_is_named() -> None:
+    part = walking(3, known=[*KNOWN, "body.z", "body.roll", "body.pitch"])
+    Y = dict.fromkeys(part.known, 0.0) | {"body.x": 3.0}
+    rates = resolve(part, Y, limits=Limits(joints=False, rates=False, margin=0.1, com="base"))
+    assert rates.status == "infeasible" and "lower margin over f" in rates.reason
+    # as many rows as pairs of feet that are an edge in any of a batch
+    q = np.stack([part.model.q] * 3)
+    tilted = bp.solve.pose_from_coordinates([[0.0, 0.0, 0.2, r, 0.0, 0.0] for r in (0.0, 0.5, 2.5)])
+    many = part.at(q, tilted)
+    rows = inequalities(many, Limits(joints=False, rates=False, margin=0.05))
+    for k in range(3):
+        one = inequalities(part.at(q[k], tilted[k]), Limits(joints=False, rates=False, margin=0.05))
+        told = dict(zip(one.labels, one.h, strict=True))
+        for i, label in enumerate(rows.labels):
+            assert rows.h[k, i] == pytest.approx(told.get(label, 1.0), abs=1e-12)
+            assert label in told or not (rows.C[k, i].any() or rows.D[k, i].any())
+
+
 # --- what cannot be done ------------------------------------------------------------------------------------
 
 
@@ -323,6 +403,11 @@ def test_refusals() -> None:
         ({"components": {"body.z": -1.0}}, r"Limits.components\['body.z'\]"),
         ({"components": {"body.z": (1.0, -1.0)}}, r"Limits.components\['body.z'\]"),
         ({"components": 3}, "Limits.components: expected a mapping"),
+        ({"margin": np.nan}, "Limits.margin"),
+        ({"stance": ["fl", "fr", "hl"]}, "Limits.margin: stance, com and gravity say of what"),
+        ({"margin": 0.0, "stance": ["fl", "fr"]}, "Limits.stance: a margin needs three feet or more, got 'fl, fr'"),
+        ({"margin": 0.0, "gravity": (0.0, 1.0)}, "Limits.gravity"),
+        ({"margin": 0.0, "com": (0.0, 1.0)}, "Limits.com"),
     ):
         with pytest.raises(InputError, match=text):
             Limits(**options)

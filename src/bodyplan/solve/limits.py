@@ -1,4 +1,5 @@
-"""Inequalities on rates: joint limits and rates, height of the body, reach of the feet, over a short time ahead."""
+"""Inequalities on rates: joint limits and rates, height of the body, reach of the feet, margin against tipping over;
+over a short time ahead."""
 
 from __future__ import annotations
 
@@ -8,12 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bodyplan.arrays import Array, number
+from bodyplan.arrays import Array, finite, number
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.robot.elements import Element
 from bodyplan.robot.model import Robot
 from bodyplan.solve.components import Component
 from bodyplan.solve.partitions import Partition
+from bodyplan.solve.stability.margins import DOWN
+from bodyplan.solve.stability.slopes import margin_slopes
 
 Pair = tuple[float, float]
 
@@ -31,11 +34,15 @@ class Limits:
     * ``reach`` (low, high) m: distance of a foot from where its leg begins to move (the axis of the first joint of its
       chain); one pair for all feet that are ends of chains, or pairs by foot. A highest reach a bit below the length of
       the stretched leg keeps its knee from straightening.
+    * ``margin`` m: least distance, that of :func:`~bodyplan.solve.stability.tip_margins`, of the centre of mass ``com``
+      from every edge of the hull of the feet ``stance`` seen along ``gravity`` (3,). stance and com are those of
+      :meth:`~bodyplan.solve.stability.Objective.at`: None are all feet, and the centre of mass where there is mass. The
+      edges are those of now; feet that stand still let none join.
     * ``components`` by name: largest rate by size, or (low, high), m/s or rad/s, of any foot's, body's or joint's rate
       in the partition's axes.
 
     A bound may be infinite. Raises InputError for bounds that are not (low, high) with low < high, a horizon that is
-    not > 0.
+    not > 0, a stance, com or gravity without a margin.
     """
 
     horizon: float = 0.1
@@ -44,6 +51,10 @@ class Limits:
     height: Pair | None = None
     reach: Pair | Mapping[str, Pair] | None = None
     components: Mapping[str, float | Pair] = field(default_factory=dict)
+    margin: float | None = None
+    stance: Sequence[str] | None = None
+    com: str | tuple[float, float, float] | None = None
+    gravity: tuple[float, float, float] = DOWN
 
     def __post_init__(self) -> None:
         number(self.horizon, "Limits.horizon", above=0.0)
@@ -61,6 +72,17 @@ class Limits:
             raise InputError(f"Limits.components: expected a mapping from names to rates, got {self.components!r}.")
         rates = {str(k): _rate(v, f"Limits.components[{k!r}]") for k, v in self.components.items()}
         object.__setattr__(self, "components", rates)
+        if self.margin is not None:
+            object.__setattr__(self, "margin", number(self.margin, "Limits.margin"))
+        elif self.stance is not None or self.com is not None or tuple(self.gravity) != DOWN:
+            raise InputError("Limits.margin: stance, com and gravity say of what; give the margin, too.")
+        object.__setattr__(self, "gravity", _three(self.gravity, "Limits.gravity"))
+        if self.com is not None and not isinstance(self.com, str):
+            object.__setattr__(self, "com", _three(self.com, "Limits.com"))
+        if isinstance(self.stance, (list, tuple)):
+            object.__setattr__(self, "stance", tuple(self.stance))
+            if len(self.stance) < 3:
+                raise InputError(f"Limits.stance: a margin needs three feet or more, got {', '.join(self.stance)!r}.")
 
 
 class Inequalities(NamedTuple):
@@ -74,7 +96,7 @@ class Inequalities(NamedTuple):
 
 def inequalities(partition: Partition, limits: Limits) -> Inequalities:
     """The rows of ``limits`` for a partition. UnknownNameError for a foot or component that it does not have,
-    InputError for the reach of a foot whose leg has no joint."""
+    InputError for the reach of a foot whose leg has no joint, or the margin of a stance that has none."""
     rows = _Rows(partition)
     model, horizon = partition.model, limits.horizon
     robot, q = model.robot, model.q
@@ -97,6 +119,14 @@ def inequalities(partition: Partition, limits: Limits) -> Inequalities:
         low, high = (np.array([bound]) for bound in _rate(rate, name))
         for component in partition.names.find(name, "Limits.components"):
             rows.add([f"rate of {partition.names.name(component)}"], [component], np.eye(1), low, high)
+    if limits.margin is not None:
+        found = margin_slopes(partition, limits.stance, limits.com, limits.gravity)
+        # a pair of feet that is no edge bounds nothing: 0 >= -1
+        low = np.where(found.real, (limits.margin - found.distance) / horizon, -1.0)
+        everything = partition.X + partition.Y
+        rows.add(
+            [f"margin over {pair}" for pair in found.pairs], everything, found.slope, low, np.full_like(low, np.inf)
+        )
     return rows.done()
 
 
@@ -193,6 +223,11 @@ def _pair(value: Any, field_name: str) -> Pair:
     if not low < high:
         raise InputError(f"{field_name}: must be (low, high) with low < high, got {value!r}.")
     return low, high
+
+
+def _three(value: Any, field_name: str) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in finite(value, field_name, (3,)))
+    return x, y, z
 
 
 def _rate(value: Any, field_name: str) -> Pair:

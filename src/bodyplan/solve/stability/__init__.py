@@ -9,8 +9,8 @@ psi = stability.Objective("barrier").at(model, stance=["fl", "fr", "hl"])
 psi.value, psi.coordinates, psi.rho(partition)
 """
 
-from bodyplan.solve.stability.ascent import Ascent, center_and_slope
+from bodyplan.solve.stability.ascent import Ascent, Psi, center_and_slope
 from bodyplan.solve.stability.margins import DOWN, Margins, tip_margins
-from bodyplan.solve.stability.objectives import KINDS, Objective, Psi
+from bodyplan.solve.stability.objectives import KINDS, Objective
 
 __all__ = ["DOWN", "KINDS", "Ascent", "Margins", "Objective", "Psi", "center_and_slope", "tip_margins"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,15 @@ from bodyplan.solve.partitions import Partition
 from bodyplan.solve.rates import Rates
 from bodyplan.spatial import hat
 
-if TYPE_CHECKING:
-    from bodyplan.solve.stability.objectives import Psi
+
+class Psi(NamedTuple):
+    """An objective and its exact gradient: ``value`` (...), by the centre of mass ``com`` (..., 3) and the ``feet``
+    (..., m, 3), 1/m, each with the others at rest, and by ``attitude`` (..., 2), roll and pitch, 1/rad."""
+
+    value: Any
+    com: Array
+    feet: Array
+    attitude: Array
 
 
 class Ascent:
@@ -76,16 +83,16 @@ class Ascent:
         The paper's rho = d psi / d X is zero, X being rates: this is what it means. InputError for a partition of
         another model.
         """
-        return self._by(partition)(partition.X)
+        return self.by(partition)(partition.X)
 
     def rate(self, rates: Rates) -> Array:
         """(...): d psi / dt at these rates, known and unknown: what they buy, in the unit of psi a second."""
-        by = self._by(rates.partition)
+        by = self.by(rates.partition)
         return np.asarray(
             (by(rates.partition.X) * rates.X).sum(axis=-1) + (by(rates.partition.Y) * rates.Y).sum(axis=-1)
         )
 
-    def _by(self, partition: Partition) -> Callable[[tuple[Component, ...]], Array]:
+    def by(self, partition: Partition) -> Callable[[tuple[Component, ...]], Array]:
         other = partition.model
         same = other.robot is self.model.robot and other.q is self.model.q and other.base is self.model.base
         if not same:
@@ -119,13 +126,28 @@ def ascent(
     """See :meth:`Objective.at`."""
     if not isinstance(model, Model):
         raise InputError(f"model: expected a Model, got {type(model).__name__}.")
+    at = standing(model, stance, com)
+    psi = objective(at.points, at.com, model.coordinates[..., 3:5], gravity)
+    return Ascent(model, at.feet, at.center, at.slope, at.com, psi)
+
+
+class Standing(NamedTuple):
+    """Indices of the ``feet``, their places ``points`` (..., s, 3), the centre of mass ``com`` (..., 3) in the world;
+    ``center``, ``slope``: see :func:`center_and_slope`."""
+
+    feet: tuple[int, ...]
+    points: Array
+    com: Array
+    center: Array
+    slope: Array
+
+
+def standing(model: Model, stance: Sequence[str] | None, com: Any) -> Standing:
     feet = _stance(model, stance)
     center, slope = _center(model, com)
     position = model.base[..., :3] + _times(model.body_rotation, center)
-    position = np.broadcast_to(position, (*model.shape, 3))
     points = np.broadcast_to(model.positions[..., list(feet), :], (*model.shape, len(feet), 3))
-    psi = objective(points, position, model.coordinates[..., 3:5], gravity)
-    return Ascent(model, feet, center, slope, position, psi)
+    return Standing(feet, points, np.broadcast_to(position, (*model.shape, 3)), center, slope)
 
 
 def center_and_slope(robot: Robot, q: ArrayLike) -> tuple[Array, Array]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,20 +11,10 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, BoolArray, finite, number
 from bodyplan.errors import InputError
 from bodyplan.solve.configuration import Model
-from bodyplan.solve.stability.ascent import Ascent, ascent
+from bodyplan.solve.stability.ascent import Ascent, Psi, ascent
 from bodyplan.solve.stability.margins import DOWN, Edges, hull_edges, measure_distance, measure_mu
 
 KINDS = ("printed", "text", "min_mu", "barrier")
-
-
-class Psi(NamedTuple):
-    """An objective and its exact gradient: ``value`` (...), by the centre of mass ``com`` (..., 3) and the ``feet``
-    (..., m, 3), 1/m, each with the others at rest, and by ``attitude`` (..., 2), roll and pitch, 1/rad."""
-
-    value: Any
-    com: Array
-    feet: Array
-    attitude: Array
 
 
 @dataclass(frozen=True)
