@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -198,6 +199,34 @@ def test_a_joint_pushed_against_its_limit_is_a_warning() -> None:
     trial = simulate(lift(limits=(-0.1, 0.05)), servo=(2000.0, 40.0), settle=0.1, ramp=0.0)
     assert any("'lift' is pushed against its limit" in text for text in trial.warnings)
     assert trial.q[:, 0].max() < 0.06
+
+
+def test_time_in_the_air_is_that_of_free_fall() -> None:
+    """A body that jumps off a sliding foot: in the air its centre of mass falls with g."""
+    foot = [Row(epsilon=np.pi), Row(d=Joint("push", limits=(-0.5, 0.5)), body=Body(mass=0.2))]
+    hopper = Robot.from_rows(
+        {"leg": foot},
+        base_body=Body(mass=1.0),
+        contacts=[Contact("foot", "leg.2", "box", half=(0.2, 0.2, 0.02))],
+    )
+    t = np.linspace(0.0, 1.5, 301)
+    motion = motion_of(hopper, Plane(), np.where(t < 0.5, 0.05, 0.15), t, [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0])
+    trial = simulate(motion, servo=(3000.0, 60.0), settle=0.2, ramp=0.0, record_dt=1e-3)
+    (warning,) = trial.warnings
+    told = re.fullmatch(r"in the air for (\S+) % of the time, for up to (\S+) s at a stretch", warning)
+    assert told
+    fall = np.diff(trial.com[:, 2], 2) / 1e-6
+    falling = np.abs(fall + G) < 0.01 * G
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], falling, [0]])))
+    flights = np.diff(ends.reshape(-1, 2), axis=1)  # ms
+    assert flights.max() > 100 and float(told[2]) == pytest.approx(1e-3 * flights.max(), abs=0.005)
+    real = flights[flights > 6]
+    blurred = 100.0 * 4.0 * len(real) / len(trial.t)  # second differences end 2 ms early or late
+    assert float(told[1]) == pytest.approx(100.0 * real.sum() / len(trial.t), abs=blurred)
+    # a body that lies or slides is not, whatever its stiff contacts do
+    plane, pose = downhill(0.3, 0.4)
+    for shape in ("box", "capsule"):
+        assert simulate(still(block(shape), plane, 0.8, pose), friction=0.1, ramp=0.0).warnings == ()
 
 
 def test_divergence_is_a_status_and_nothing_is_nan() -> None:

@@ -10,16 +10,17 @@ import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.simulate.library import mujoco
-from bodyplan.simulate.measure import Meter, Records, Sliding
+from bodyplan.simulate.measure import Airborne, Meter, Records, Sliding
 from bodyplan.simulate.model import Physics
 from bodyplan.simulate.reference import Reference
 from bodyplan.simulate.start import CLOSING, Walls
+from bodyplan.simulate.terrain import CONTACT_STEPS
 
 #: norm of all velocities (rad/s and m/s) beyond which the physics has left the real world
 RUNAWAY = 1e4
 #: time steps whose targets are computed at once
 BLOCK = 1000
-#: share of the records without contact from which on it is worth a warning: stiff contacts chatter for a step
+#: share of the time in the air from which on it is worth a warning
 AIRBORNE = 0.01
 
 
@@ -101,13 +102,13 @@ class Run:
         self._qpos = np.zeros((size, model.nq))
         self._t, self._com, self._force = np.zeros(size), np.zeros((size, 3)), np.zeros((size, model.nu))
         self._touch = np.zeros((size, len(physics.wheels.pointers)))
-        self._airborne, self._count = 0, 0
+        self.airborne, self._count = Airborne(physics, round(CONTACT_STEPS)), 0
 
     def go(self) -> None:
         """Run to the end, or until the physics diverges (then ``failure`` says how)."""
         mj, model, data, timing = mujoco(), self.physics.model, self.data, self.timing
         model.opt.disableflags |= int(mj.mjtDisableBit.mjDSBL_AUTORESET)  # a lost state must stay visible
-        step, scales, meter = mj.mj_step, self.physics.scales, self.meter
+        step, scales, meter, airborne = mj.mj_step, self.physics.scales, self.meter, self.airborne
         ctrl, qvel = data.ctrl, data.qvel
         length, velocity, force = data.actuator_length, data.actuator_velocity, data.actuator_force
         closing = round(CLOSING * timing.settle / timing.dt) if self.walls.depth > 0.0 else 0
@@ -130,6 +131,7 @@ class Run:
                 self._qpos[self._count] = data.qpos
                 step(model, data)
                 self._record(k * timing.dt)
+            airborne.add(data)
             if not qvel.dot(qvel) < fastest:  # also catches NaN
                 self.failure = self._diverged()
                 return
@@ -173,8 +175,10 @@ class Run:
         low, high = robot.limits.T
         for column in np.flatnonzero(np.any((q < low) | (q > high), axis=0)):
             found.append(f"joint {robot.joints[column]!r} is pushed against its limit")
-        if self._airborne > AIRBORNE * s:
-            found.append(f"no contact with the ground for {100.0 * self._airborne / s:.1f} % of the time")
+        air, longest = (steps * self.timing.dt for steps in (self.airborne.steps, self.airborne.longest))
+        part = air / float(self._t[s - 1] or 1.0)
+        if part > AIRBORNE:
+            found.append(f"in the air for {100.0 * part:.1f} % of the time, for up to {longest:.2g} s at a stretch")
         slack = self.physics.coupling_error(self._qpos[:s])
         if slack > 1e-3:
             what = "slides of wheels" if self.physics.wheels.rings else "axes that share a joint"
@@ -192,7 +196,6 @@ class Run:
         i, data = self._count, self.data
         self._t[i], self._com[i], self._force[i] = t, data.subtree_com[1], data.actuator_force
         self._touch[i] = self.physics.wheels.directions(data)
-        self._airborne += int(data.ncon == 0 and i > 0)  # at first it just touches, which is no contact yet
         if t >= self.timing.start_time:
             self.sliding.add(data)
         self._count = i + 1

@@ -98,6 +98,27 @@ class Sliding:
         return float(np.arctan2(self.across, self.along)) if self.along + self.across > 0.0 else None
 
 
+class Airborne:
+    """Time steps without contact with the ground. A stiff contact at rest chatters: within its time constant, ``lull``
+    time steps, it may let go without a flight; what is shorter does not count."""
+
+    def __init__(self, physics: Physics, lull: int) -> None:
+        self.steps, self.longest = 0, 0
+        self._lull, self._now, self._ground = lull, 0, physics.solid_geoms
+        pairs = np.stack([physics.model.pair_geom1, physics.model.pair_geom2], axis=-1)
+        self._elsewhere = not np.isin(pairs, self._ground).any(axis=-1).all()
+
+    def add(self, data: Any) -> None:
+        """The contacts of one time step."""
+        if data.ncon and (not self._elsewhere or np.isin(data.contact.geom[: data.ncon], self._ground).any()):
+            self._now = 0
+            return
+        self._now += 1
+        if self._now >= self._lull:
+            self.steps += self._lull if self._now == self._lull else 1
+            self.longest = max(self.longest, self._now)
+
+
 @dataclass(frozen=True, eq=False)
 class Records:
     """What a run recorded: t (S,), base (S, 7), q (S, n), torque (S, n), com (S, 3)."""
