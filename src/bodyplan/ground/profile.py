@@ -56,6 +56,11 @@ class Profile(Ground):
         """The x of the floor's steps (k,), ascending, and the levels (k + 1,) between them, m."""
         return self._floor_x, self._floor_z
 
+    @property
+    def ceiling_levels(self) -> tuple[Array, Array]:
+        """The same of the ceiling; a level is inf where it is open."""
+        return self._ceiling_x, self._ceiling_z
+
     def ceiling_height(self, x: ArrayLike) -> Array:
         """Ceiling z (...,) in m at x (...,); inf where it is open."""
         at = finite(x, "x")

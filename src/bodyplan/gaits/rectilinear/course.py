@@ -12,7 +12,7 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import Demands, move_names, phases
 from bodyplan.gaits.rectilinear.moves import Moves
-from bodyplan.gaits.rectilinear.search import Walker, search
+from bodyplan.gaits.rectilinear.search import search
 from bodyplan.gaits.rectilinear.sequence import Sequence
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.gaits.rectilinear.strides import (
@@ -24,6 +24,7 @@ from bodyplan.gaits.rectilinear.strides import (
     stride_of,
 )
 from bodyplan.gaits.rectilinear.track import Track
+from bodyplan.gaits.rectilinear.walker import Walker
 from bodyplan.robot.model import Robot
 
 if TYPE_CHECKING:
@@ -191,11 +192,8 @@ def _move(walker: Walker, here: Array, group: IntArray, drives: Array, name: str
         return move, walker.demands.met(move)[0]
     status = Status.OK
     for i in group:
-        alone = here.copy()
-        alone[i] = after[i]
-        shaped, found = walker.shaped(here[None], alone[None], np.array([i]))
-        lift[i], early[i] = shaped.lift[0, i], shaped.early[0, i]
-        status = found[0] if status == Status.OK else status
+        (_, lift[i], early[i]), found = walker.shaped(here, int(i), after[i])
+        status = found if status == Status.OK else status
     return Moves(here[None], after[None], lift[None], early[None], (name,)), status
 
 
@@ -228,7 +226,7 @@ def _over_steps(
     wanted = int(min(most, np.ceil(until / a_move - 1e-9)))
     walker = replace(walker, short=np.diff(local.moves.after[..., 0], axis=-1).min(axis=0))
     way = search(walker, start, gait.schedule, wanted, pace)
-    if way.status != Status.OK and track.above is not None:
+    if way.status != Status.OK and np.isfinite(track.steps.roof_z).any():
         # a low place: come to it stretched
         crouch = float(demands.straight.max())
         other = search(replace(walker, crouch=crouch), start, gait.schedule, wanted, pace)

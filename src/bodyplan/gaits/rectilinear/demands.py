@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
-from bodyplan.gaits.rectilinear.moves import Moves, State, bends
+from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, worst
+from bodyplan.gaits.rectilinear.moves import Moves, bends
 from bodyplan.gaits.rectilinear.parts import Parts
 
 #: places along a move that are tried at first, and in each of the rounds that close in on the worst of them
@@ -70,67 +72,49 @@ class Demands:
         folded = np.where(self.ceiling < np.minimum(a, b), under, np.abs(a - b))
         return np.asarray(np.maximum(folded, self.nearest))
 
-    def excess(self, state: State, swinging: BoolArray) -> dict[Status, Array]:
-        """How far a state is beyond every demand, relative to links or as a share of pi, (..., k) a status; not
-        positive where it is met. ``swinging`` (..., N): the anchors that do not carry."""
-        size = float(self.links.max())
-        square, folded = self.straight**2, (self.links[0::2] - self.links[1::2]) ** 2
-        out = {
-            Status.OUT_OF_REACH: -state.legs.short / square,
-            Status.COLLAPSED: (np.maximum(self.nearest**2, folded + 1e-12 * square) - _square(state)) / square,
-        }
-        elbows = state.elbows(self.links)
-        if np.isfinite(self.ceiling):
-            # a lifted anchor may be higher than the elbows beside it
-            rear, front = state.anchors[..., :-1, 1], state.anchors[..., 1:, 1]
-            high = np.concatenate([elbows[..., 1], np.maximum(rear, front)], axis=-1)
-            low = np.minimum(rear, front)
-            out[Status.ABOVE_CEILING] = (high - np.concatenate([low, low], axis=-1) - self.ceiling) / size
+    @cached_property
+    def bounds(self) -> Bounds:
+        """All of this for kernels."""
+        limits = np.tile([-np.inf, np.inf], (len(self.links) + 1, 1))
         if len(self.limits):
-            q = bends(state.angles)
-            beyond = np.concatenate([self.limits[:, 0] - q, q - self.limits[:, 1]], axis=-1) / np.pi
-            out[Status.LIMIT] = beyond[..., np.isfinite(self.limits.T.ravel())]
-        if self.parts is not None:
-            into = self.parts.overlaps(state.points(self.links), state.angles, self.tail) / size
-            out[Status.COLLAPSED] = np.concatenate([out[Status.COLLAPSED], into[..., :1]], axis=-1)
-            out[Status.LINKS_CROSSING] = into[..., 1:]
-        if self.margin is not None and self.balance is not None:
-            center = self.balance.center(state.anchors[..., 0], elbows[..., 0])
-            rear = np.where(swinging, np.inf, state.anchors[..., 0]).min(axis=-1)
-            front = np.where(swinging, -np.inf, state.anchors[..., 0]).max(axis=-1)
-            out[Status.TIPS_OVER] = (self.margin - np.stack([center - rear, front - center], axis=-1)) / size
-        return out
+            limits = np.array(self.limits, dtype=np.float64)
+        none = np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2)), np.zeros((0, 0)), np.zeros((0, 0), dtype=bool)
+        parts = self.parts
+        link, ends, need, leg = none if parts is None else (parts.link, parts.ends, parts.need, parts.leg)
+        asked = self.margin is not None and self.balance is not None
+        return Bounds(
+            np.array(self.links, dtype=np.float64),
+            float(self.ceiling),
+            limits,
+            bool(np.isfinite(limits).any()),
+            float(self.nearest),
+            np.asarray(link, dtype=np.int64),
+            np.ascontiguousarray(ends),
+            np.ascontiguousarray(need),
+            np.ascontiguousarray(leg),
+            float(need.max(initial=0.0)),
+            float(self.tail),
+            np.zeros(len(limits)) if self.balance is None else np.array(self.balance.weights, dtype=np.float64),
+            0.0 if self.balance is None else float(self.balance.shift),
+            float(self.margin) if asked and self.margin is not None else np.nan,
+        )
 
     def met(self, moves: Moves) -> list[Status]:
         """The first demand that each move breaks, or ok."""
-        found = self.worst(moves)
-        return [next((status for status, most in found.items() if most[m] > MET), Status.OK) for m in range(len(moves))]
+        found = self._worst(moves, False) > MET
+        return [next((DEMANDS[d] for d in np.flatnonzero(row)), Status.OK) for row in found]
 
-    def worst(self, moves: Moves) -> dict[Status, Array]:
-        """The largest excess (M,) of every move over each demand, see :meth:`excess`; between the places tried, too, by
-        closing in on the worst of them."""
-        count = len(moves)
-        tau = np.broadcast_to(np.linspace(0.0, 1.0, COARSE), (count, COARSE))
-        which = np.arange(count)
-        swinging = moves.swinging[:, None]
-        step = 1.0 / (COARSE - 1)
-        found: dict[Status, Array] = {}
-        for _ in range(ROUNDS + 1):
-            state = moves.state(self.links, np.broadcast_to(which[:, None], tau.shape), tau)
-            beyond = self.excess(state, swinging)
-            places = []
-            for status, values in beyond.items():
-                filled = np.where(np.isfinite(values), values, -np.inf)  # a leg out of reach has no elbow
-                # elbows and lifted anchors are highest at different places
-                for part in np.split(filled, 2, axis=-1) if status == Status.ABOVE_CEILING else [filled]:
-                    along = part.max(axis=-1, initial=-np.inf)
-                    found[status] = np.maximum(found.get(status, -np.inf), along.max(axis=1))
-                    places.append(np.take_along_axis(tau, along.argmax(axis=1)[:, None], axis=1))
-            around = np.concatenate(places, axis=1)
-            offsets = step * np.linspace(-1.0, 1.0, FINE)
-            tau = np.clip((around[..., None] + offsets).reshape(count, -1), 0.0, 1.0)
-            step *= 2.0 / (FINE - 1)
-        return found
+    def worst(self, moves: Moves) -> tuple[Array, Array]:
+        """The largest excess (M,) of every move over all demands but reach, and over reach, relative to links or as a
+        share of pi; not positive where they are met. Between the places tried, too, by closing in on the worst of them.
+        Of reach only the sign tells where it is met."""
+        found = self._worst(moves, True)
+        return found[:, 1:].max(axis=1), found[:, 0]
+
+    def _worst(self, moves: Moves, largest: bool) -> Array:
+        out = np.empty((len(moves), len(DEMANDS)))
+        worst(self.bounds, *moves.tables, moves.swinging, MET, COARSE, FINE, ROUNDS, largest, out)
+        return out
 
     def durations(self, moves: Moves, least: float, places: int = RATE_PLACES) -> Array:
         """(M,) s: ``least``, or longer where a joint would turn faster than its rate, taken at ``places`` of a move."""
@@ -156,8 +140,3 @@ def move_names(anchors: int, schedule: str) -> list[str]:
     if anchors == 3:
         return ["tail moves", "middle moves", "head moves"]
     return [f"anchor {i + 1} moves" for i in range(anchors)]
-
-
-def _square(state: State) -> Array:
-    chord = np.diff(state.anchors, axis=-2)
-    return np.asarray(np.sum(chord * chord, axis=-1))

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from bodyplan.arrays import Array
 
@@ -29,68 +30,100 @@ class Leg(NamedTuple):
     folded: Array
 
 
-class LegRates(NamedTuple):
-    """First and second derivatives (...,) of the absolute angles."""
-
-    rear: Array
-    front: Array
-    rear_second: Array
-    front_second: Array
-
-
-def leg(a: Array, b: Array, x: Array, z: Array, short: Array | None = None) -> Leg:
+def leg(a: Array, b: Array, x: Array, z: Array) -> Leg:
     """Angles of legs with links ``a`` (rear) and ``b`` (front) m and chords (``x``, ``z``) m, all broadcast.
 
     alpha = atan2(z, x) is signed (the printed (35)-(38) are not); beta and psi are the angles of the triangle at the
-    rear and the front anchor: rear = alpha + beta, front = alpha - psi. ``short``: S, where it is known better than
-    from the chord. Legs that do not reach, or fold beyond the difference of their links, have NaN angles.
+    rear and the front anchor: rear = alpha + beta, front = alpha - psi. Legs that do not reach, or fold beyond the
+    difference of their links, have NaN angles.
     """
-    square = x * x + z * z
-    if short is None:
-        length = np.sqrt(square)
-        short = (a + b - length) * (a + b + length)
+    rear, front, along, up = (np.array(v, dtype=np.float64) for v in np.broadcast_arrays(a, b, x, z))
+    out = np.empty((5, along.size))
+    _legs(rear.ravel(), front.ravel(), along.ravel(), up.ravel(), out)
+    return Leg(*out.reshape(5, *along.shape))
+
+
+@njit(cache=True)
+def _legs(a: Array, b: Array, x: Array, z: Array, out: Array) -> None:
+    for k in range(len(a)):
+        length = np.sqrt(x[k] * x[k] + z[k] * z[k])
+        short = (a[k] + b[k] - length) * (a[k] + b[k] + length)
+        out[0, k], out[1, k], out[2, k], out[4, k] = leg_angles(a[k], b[k], x[k], z[k], short)
+        out[3, k] = short
+
+
+@njit(cache=True)
+def within(a: float, b: float, square: float, short: float) -> tuple[float, float]:
+    """S and C of a leg whose chord has that ``square`` (m^2), 0 where they are below it by rounding, NaN where there is
+    no such leg. ``short``: S, known better than from the chord."""
     folded = square - (a - b) ** 2
     slack = REACH * (a + b) ** 2
-    s, c = (np.where(v >= 0.0, v, np.where(v >= -slack, 0.0, np.nan)) for v in (short, folded))
+    s = short if short >= 0.0 else (0.0 if short >= -slack else np.nan)
+    c = folded if folded >= 0.0 else (0.0 if folded >= -slack else np.nan)
+    return s, c
+
+
+@njit(cache=True)
+def leg_angles(a: float, b: float, x: float, z: float, short: float) -> tuple[float, float, float, float]:
+    """``rear``, ``front``, ``bend`` and ``folded`` of one :class:`Leg`."""
+    square = x * x + z * z
+    s, c = within(a, b, square, short)
     alpha = np.arctan2(z, x)
     height = np.sqrt(s * c)  # 2 a b sin(bend)
     beta = np.arctan2(height, square + a * a - b * b)
     psi = np.arctan2(height, square + b * b - a * a)
-    return Leg(alpha + beta, alpha - psi, 2.0 * np.arctan2(np.sqrt(s), np.sqrt(c)), short, folded)
+    return alpha + beta, alpha - psi, 2.0 * np.arctan2(np.sqrt(s), np.sqrt(c)), square - (a - b) ** 2
 
 
+@njit(cache=True)
+def elbow(a: float, b: float, x: float, z: float, short: float) -> tuple[float, float]:
+    """The elbow from the rear anchor, m along and up, without angles; NaN where there is no such leg."""
+    square = x * x + z * z
+    s, c = within(a, b, square, short)
+    if square == 0.0:  # a chord of no length has no direction: as if it were level
+        return a + 0.0 * (s + c), 0.0
+    share, height = 0.5 * (square + a * a - b * b) / square, 0.5 * np.sqrt(s * c) / square
+    return share * x - height * z, share * z + height * x
+
+
+@njit(cache=True)
 def leg_rates(
-    a: Array,
-    b: Array,
-    found: Leg,
-    chord: tuple[Array, Array],
-    velocity: tuple[Array, Array],
-    acceleration: tuple[Array, Array],
-) -> LegRates:
-    """Exact derivatives of the angles of a :class:`Leg` whose chord moves with ``velocity`` and ``acceleration``.
+    a: float,
+    b: float,
+    short: float,
+    folded: float,
+    chord: tuple[float, float],
+    velocity: tuple[float, float],
+    acceleration: tuple[float, float],
+) -> tuple[float, float, float, float]:
+    """Exact first derivatives of the rear and the front angle, then second ones, of a leg whose chord moves with
+    ``velocity`` and ``acceleration``.
 
     A straight leg has rates only where its chord is at rest (they are 0 then, as the swing paths come to rest faster
     than the leg straightens): on its way through it they would be infinite.
     """
     (x, z), (vx, vz), (ax, az) = chord, velocity, acceleration
     square = x * x + z * z
-    square = np.where(square > 0.0, square, 1.0)  # a chord of no length has no direction and turns nowhere
+    if square <= 0.0:
+        square = 1.0  # a chord of no length has no direction and turns nowhere
     first = 2.0 * (x * vx + z * vz)
     second = 2.0 * (vx * vx + vz * vz + x * ax + z * az)
-    s, c = np.maximum(found.short, 0.0), np.maximum(found.folded, 0.0)
+    s, c = max(short, 0.0), max(folded, 0.0)
     height = np.sqrt(s * c)
-    bent = height > 0.0
-    w = np.where(bent, height, 1.0)
-    bend = np.where(bent, -first / w, 0.0)
-    turn = 0.5 * first * (s - c) / w  # dw/dt
-    bend2 = np.where(bent, -(second * w - first * turn) / (w * w), 0.0)
-    out = []
+    bend = bend2 = 0.0
+    if height > 0.0:
+        turn = 0.5 * first * (s - c) / height  # dw/dt
+        bend = -first / height
+        bend2 = -(second * height - first * turn) / (height * height)
     alpha = (x * vz - z * vx) / square
     alpha2 = (x * az - z * ax) / square - alpha * first / square
-    for sign, own, other in ((1.0, a, b), (-1.0, b, a)):
-        # d(beta)/d(bend) = (L^2 + b^2 - a^2) / (2 L^2), and the same for psi with the links exchanged
-        part = 0.5 * (square + other * other - own * own) / square
-        change = 0.5 * first / square - part * first / square
-        out.append((alpha + sign * part * bend, alpha2 + sign * (part * bend2 + change * bend)))
-    (rear, rear2), (front, front2) = out
-    return LegRates(rear, front, rear2, front2)
+    # d(beta)/d(bend) = (L^2 + b^2 - a^2) / (2 L^2), and the same for psi with the links exchanged
+    part = 0.5 * (square + b * b - a * a) / square
+    other = 0.5 * (square + a * a - b * b) / square
+    change, change_other = (0.5 - part) * first / square, (0.5 - other) * first / square
+    return (
+        alpha + part * bend,
+        alpha - other * bend,
+        alpha2 + (part * bend2 + change * bend),
+        alpha2 - (other * bend2 + change_other * bend),
+    )

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.rectilinear.legs import REACH, Leg, leg, leg_rates
-from bodyplan.gaits.rectilinear.swing import swing
+from bodyplan.gaits.rectilinear.legs import REACH, Leg, leg_angles, leg_rates
+from bodyplan.gaits.rectilinear.swing import swing_rates, swung
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,13 @@ class Moves:
         """(M, N) True for those that are lifted on their way and carry nothing."""
         return np.asarray(self.moving & (self.lift > 0.0))
 
+    @property
+    def tables(self) -> tuple[Array, Array, Array, Array]:
+        """``before``, ``after``, ``lift`` and ``early`` for kernels."""
+        return tuple(
+            np.ascontiguousarray(v, dtype=np.float64) for v in (self.before, self.after, self.lift, self.early)
+        )  # type: ignore[return-value]
+
     @classmethod
     def joined(cls, parts: Sequence[Moves]) -> Moves:
         """Moves of several tables, in order."""
@@ -47,32 +55,85 @@ class Moves:
 
     def state(self, links: Array, which: IntArray, tau: Array) -> State:
         """The snake with ``links`` (2 N - 2,) m at ``tau`` (...,) in [0, 1] of the moves ``which`` (...,)."""
-        before, after = self.before[which], self.after[which]
-        moved = swing(tau[..., None], after - before, self.lift[which], self.early[which])
-        early = (tau < 0.5)[..., None]
-        start, offset = (
-            np.where(early[..., None], before, after),
-            np.where(early[..., None], moved.risen, moved.landing),
-        )
-        anchors = start + offset
-        a, b = links[0::2], links[1::2]
-        from_chord, off = np.diff(start, axis=-2), np.diff(offset, axis=-2)
-        chord = from_chord + off
-        # S from the nearer end of the move: a leg that is straight there bends without loss of digits
-        full = (a + b) ** 2
-        at_end = full - np.sum(from_chord**2, axis=-1)
-        at_end = np.where(np.abs(at_end) <= REACH * full, 0.0, at_end)
-        short = at_end - np.sum(off * (2.0 * from_chord + off), axis=-1)
-        legs = leg(a, b, chord[..., 0], chord[..., 1], short)
-        speed, change = np.diff(moved.velocity, axis=-2), np.diff(moved.acceleration, axis=-2)
-        rates = leg_rates(a, b, legs, _pair(chord), _pair(speed), _pair(change))
-        return State(
-            anchors,
-            _serial(legs.rear, legs.front),
-            _serial(rates.rear, rates.front),
-            _serial(rates.rear_second, rates.front_second),
-            legs,
-        )
+        which, tau = (np.array(v) for v in np.broadcast_arrays(which, tau))
+        shape, size, count = tau.shape, tau.size, self.before.shape[1]
+        anchors, angles = np.empty((size, count, 2)), np.empty((3, size, 2 * count - 2))
+        legs = np.empty((3, size, count - 1))
+        _states(*self.tables, np.ascontiguousarray(links), which.ravel(), tau.ravel(), anchors, angles, legs)
+        angles, (bend, short, folded) = angles.reshape(3, *shape, -1), legs.reshape(3, *shape, -1)
+        found = Leg(angles[0, ..., 0::2], angles[0, ..., 1::2], bend, short, folded)
+        return State(anchors.reshape(*shape, count, 2), angles[0], angles[1], angles[2], found)
+
+
+@njit(cache=True)
+def swing_of(
+    before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, start: Array, offset: Array
+) -> None:
+    """Anchors of move ``m`` at ``tau``: ``start`` (N, 2) m, where they are at the nearer end of the move, and their
+    ``offset`` (N, 2) m from there."""
+    for i in range(before.shape[1]):
+        dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]
+        near = before if tau < 0.5 else after
+        start[i, 0], start[i, 1] = near[m, i, 0], near[m, i, 1]
+        offset[i] = 0.0
+        if dx != 0.0 or dz != 0.0 or lift[m, i] != 0.0:
+            risen_x, risen_z, left_x, left_z = swung(tau, dx, dz, lift[m, i], early[m, i])
+            offset[i, 0] = risen_x if tau < 0.5 else left_x
+            offset[i, 1] = risen_z if tau < 0.5 else left_z
+
+
+@njit(cache=True)
+def chord_of(start: Array, offset: Array, i: int, full: float) -> tuple[float, float, float]:
+    """Chord of leg ``i`` along and up, m, and its S = ``full`` - L^2: from the nearer end of the move, so that a leg
+    that is straight there bends without loss of digits."""
+    fx, fz = start[i + 1, 0] - start[i, 0], start[i + 1, 1] - start[i, 1]
+    ox, oz = offset[i + 1, 0] - offset[i, 0], offset[i + 1, 1] - offset[i, 1]
+    at_end = full - (fx * fx + fz * fz)
+    if abs(at_end) <= REACH * full:
+        at_end = 0.0
+    return fx + ox, fz + oz, at_end - (ox * (2.0 * fx + ox) + oz * (2.0 * fz + oz))
+
+
+@njit(cache=True)
+def _states(
+    before: Array,
+    after: Array,
+    lift: Array,
+    early: Array,
+    links: Array,
+    which: IntArray,
+    tau: Array,
+    anchors: Array,
+    angles: Array,
+    legs: Array,
+) -> None:
+    """``anchors`` (S, N, 2), ``angles`` and their derivatives (3, S, 2 N - 2), bend, S and C of the ``legs``
+    (3, S, N - 1) at ``tau`` (S,) of the moves ``which`` (S,)."""
+    count = before.shape[1]
+    start, offset, rates = np.empty((count, 2)), np.empty((count, 2)), np.zeros((count, 4))
+    for s in range(len(tau)):
+        m = which[s]
+        swing_of(before, after, lift, early, m, tau[s], start, offset)
+        for i in range(count):
+            anchors[s, i] = start[i] + offset[i]
+            dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]
+            rates[i] = 0.0
+            if dx != 0.0 or dz != 0.0 or lift[m, i] != 0.0:
+                rates[i, 0], rates[i, 1], rates[i, 2], rates[i, 3] = swing_rates(
+                    tau[s], dx, dz, lift[m, i], early[m, i]
+                )
+        for i in range(count - 1):
+            a, b = links[2 * i], links[2 * i + 1]
+            x, z, short = chord_of(start, offset, i, (a + b) ** 2)
+            rear, front, bend, folded = leg_angles(a, b, x, z, short)
+            change = rates[i + 1] - rates[i]
+            rear1, front1, rear2, front2 = leg_rates(
+                a, b, short, folded, (x, z), (change[0], change[1]), (change[2], change[3])
+            )
+            angles[0, s, 2 * i], angles[0, s, 2 * i + 1] = rear, front
+            angles[1, s, 2 * i], angles[1, s, 2 * i + 1] = rear1, front1
+            angles[2, s, 2 * i], angles[2, s, 2 * i + 1] = rear2, front2
+            legs[0, s, i], legs[1, s, i], legs[2, s, i] = bend, short, folded
 
 
 class State(NamedTuple):
@@ -104,11 +165,3 @@ def bends(angles: Array) -> Array:
     level head link; the same for their derivatives."""
     level = np.zeros((*angles.shape[:-1], 1))
     return np.diff(np.concatenate([level, angles, level], axis=-1), axis=-1)
-
-
-def _serial(rear: Array, front: Array) -> Array:
-    return np.stack([rear, front], axis=-1).reshape(*rear.shape[:-1], -1)
-
-
-def _pair(points: Array) -> tuple[Array, Array]:
-    return points[..., 0], points[..., 1]

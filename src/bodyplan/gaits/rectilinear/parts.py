@@ -82,28 +82,54 @@ def _overlaps(
     origins: Array, turns: Array, known: IntArray, link: IntArray, ends: Array, need: Array, leg: BoolArray, out: Array
 ) -> None:
     """Largest need - distance of two parts, into ``out`` (S, 2), of the states ``known``."""
-    count = len(link)
-    at, low, high, ahead = np.empty((count, 4)), np.empty(count), np.empty(count), np.empty(count)
+    turn, work = np.empty((turns.shape[1], 2)), np.empty((7, len(link)))
     most = need.max()
     for s in known:
-        out[s] = -most
-        for p in range(count):
-            cos, sin = np.cos(turns[s, link[p]]), np.sin(turns[s, link[p]])
-            for e in range(2):
-                x, z = ends[p, e]
-                at[p, 2 * e] = origins[s, link[p], 0] + cos * x - sin * z
-                at[p, 2 * e + 1] = origins[s, link[p], 1] + sin * x + cos * z
-            low[p], high[p] = min(at[p, 0], at[p, 2]), max(at[p, 0], at[p, 2])
-        ahead[count - 1] = low[count - 1]
-        for p in range(count - 2, -1, -1):
-            ahead[p] = min(low[p], ahead[p + 1])
-        for i in range(count):
-            for j in range(i + 1, count):
-                if most - (ahead[j] - high[i]) <= min(out[s, 0], out[s, 1]):
-                    break
-                side = 0 if leg[i, j] else 1
-                if need[i, j] > 0.0 and need[i, j] - max(low[j] - high[i], low[i] - high[j]) > out[s, side]:
-                    out[s, side] = max(out[s, side], need[i, j] - _distance(at[i], at[j]))
+        for k in range(len(turn)):
+            turn[k, 0], turn[k, 1] = np.cos(turns[s, k]), np.sin(turns[s, k])
+        out[s, 0], out[s, 1] = overlap(origins[s], turn, link, ends, need, leg, most, -most, work)
+
+
+@njit(cache=True)
+def overlap(
+    origins: Array,
+    turn: Array,
+    link: IntArray,
+    ends: Array,
+    need: Array,
+    leg: BoolArray,
+    most: float,
+    least: float,
+    work: Array,
+) -> tuple[float, float]:
+    """Largest need - distance m of two parts of one leg, and of two of different legs, but not below ``least``, in one
+    pose: ``origins`` (2 N, 2) m of all links, cosine and sine of their angles ``turn`` (2 N, 2). ``most``: the largest
+    ``need``; ``work`` (7, P) is written over."""
+    count = len(link)
+    at, low, high, ahead = work[:4].T, work[4], work[5], work[6]
+    own = other = least
+    for p in range(count):
+        k = link[p]
+        for e in range(2):
+            x, z = ends[p, e]
+            at[p, 2 * e] = origins[k, 0] + turn[k, 0] * x - turn[k, 1] * z
+            at[p, 2 * e + 1] = origins[k, 1] + turn[k, 1] * x + turn[k, 0] * z
+        low[p], high[p] = min(at[p, 0], at[p, 2]), max(at[p, 0], at[p, 2])
+    ahead[count - 1] = low[count - 1]
+    for p in range(count - 2, -1, -1):
+        ahead[p] = min(low[p], ahead[p + 1])
+    for i in range(count):
+        for j in range(i + 1, count):
+            if most - (ahead[j] - high[i]) <= min(own, other):
+                break
+            found = own if leg[i, j] else other
+            if need[i, j] > 0.0 and need[i, j] - max(low[j] - high[i], low[i] - high[j]) > found:
+                found = max(found, need[i, j] - _distance(at[i], at[j]))
+                if leg[i, j]:
+                    own = found
+                else:
+                    other = found
+    return own, other
 
 
 @njit(cache=True)

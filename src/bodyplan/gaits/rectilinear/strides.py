@@ -138,12 +138,8 @@ def largest_stride(demands: Demands, long: Array, schedule: str, lift: float, mo
 
 def _excess(demands: Demands, cycles: list[Moves]) -> Array:
     """(C, 2): the largest excess of every cycle over all demands but reach, and over reach."""
-    found = {
-        status: most.reshape(len(cycles), -1).max(axis=1)
-        for status, most in demands.worst(Moves.joined(cycles)).items()
-    }
-    reach = found.pop(Status.OUT_OF_REACH)
-    return np.stack([np.max(list(found.values()), axis=0), reach], axis=-1)
+    found = demands.worst(Moves.joined(cycles))
+    return np.stack([most.reshape(len(cycles), -1).max(axis=1) for most in found], axis=-1)
 
 
 def stride_of(

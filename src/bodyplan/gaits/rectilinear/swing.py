@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
-from bodyplan.arrays import Array, BoolArray
+from bodyplan.arrays import Array
 
 PATHS = ("cycloid",)
 #: how long a step up that rises early waits before it goes along, as a share of what it is early by
@@ -33,59 +34,101 @@ def swing(tau: Array, step: Array, lift: Array, early: Array) -> Swing:
     so that neither an anchor nor a level leg that begins straight jumps in rate or acceleration (a sloping one, which
     the lift bends as tau^2, jumps in acceleration).
     """
-    tau, lift, early = (np.asarray(v, dtype=np.float64) for v in (tau, lift, early))
-    u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
-    first, second = 6.0 * tau * (1.0 - tau), 6.0 - 12.0 * tau
-    rising = np.asarray(step[..., 1] >= 0.0)
-    rise, fall, rise1, rise2 = climb = _part(u, rest, 1.0 - early, rising)
-    along, left, slope, curve = _part(u, rest, WAIT * (1.0 - early), ~rising) if np.any(early < 1.0) else climb
-    # sin^2(pi u) = X'(u) / 2
-    hump, hump1 = (0.5 * rate for rate in _cycloid_rates(u, rest))
-    hump2 = 2.0 * np.pi**2 * np.cos(2.0 * np.pi * u)
-    dx, dz = step[..., 0], step[..., 1]
-
-    def by_tau(by_u: Array, by_u2: Array) -> tuple[Array, Array]:
-        return by_u * first, by_u2 * first**2 + by_u * second
-
-    vx, ax = by_tau(dx * slope, dx * curve)
-    vz, az = by_tau(dz * rise1 + lift * hump1, dz * rise2 + lift * hump2)
-    return Swing(
-        np.stack([dx * along, dz * rise + lift * hump], axis=-1),
-        np.stack([-dx * left, lift * hump - dz * fall], axis=-1),
-        np.stack([vx, vz], axis=-1),
-        np.stack([ax, az], axis=-1),
-    )
+    given = np.broadcast_arrays(tau, step[..., 0], step[..., 1], lift, early)
+    when, dx, dz, high, share = (np.array(v, dtype=np.float64) for v in given)
+    out = np.empty((when.size, 8))
+    _swings(when.ravel(), dx.ravel(), dz.ravel(), high.ravel(), share.ravel(), out)
+    return Swing(*(out[:, k : k + 2].reshape(*when.shape, 2) for k in range(0, 8, 2)))
 
 
 def cycloid(u: Array) -> Array:
     """X(u) = u - sin(2 pi u) / (2 pi) with full relative precision also where it is small."""
+    at = np.array(u, dtype=np.float64)
+    out = np.empty(at.size)
+    _cycloids(at.ravel(), out)
+    return out.reshape(at.shape)
+
+
+@njit(cache=True)
+def _swings(tau: Array, dx: Array, dz: Array, lift: Array, early: Array, out: Array) -> None:
+    for k in range(len(tau)):
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = swung(tau[k], dx[k], dz[k], lift[k], early[k])
+        out[k, 4], out[k, 5], out[k, 6], out[k, 7] = swing_rates(tau[k], dx[k], dz[k], lift[k], early[k])
+
+
+@njit(cache=True)
+def _cycloids(u: Array, out: Array) -> None:
+    for k in range(len(u)):
+        out[k] = _cycloid(u[k])
+
+
+@njit(cache=True)
+def swung(tau: float, dx: float, dz: float, lift: float, early: float) -> tuple[float, float, float, float]:
+    """One anchor of :func:`swing`: ``risen`` and ``landing``, each along and up."""
+    u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
+    up, down = _parts(u, rest, 1.0 - early, dz >= 0.0)
+    rise, fall = _cycloid(up), _cycloid(down)
+    along, left = rise, fall
+    if early < 1.0:
+        behind, ahead = _parts(u, rest, WAIT * (1.0 - early), dz < 0.0)
+        along, left = _cycloid(behind), _cycloid(ahead)
+    hump = lift * np.sin(np.pi * min(u, rest)) ** 2
+    return dx * along, dz * rise + hump, -dx * left, hump - dz * fall
+
+
+@njit(cache=True)
+def swing_rates(tau: float, dx: float, dz: float, lift: float, early: float) -> tuple[float, float, float, float]:
+    """One anchor of :func:`swing`: ``velocity`` and ``acceleration``, each along and up."""
+    u, rest = _smooth(tau), _smooth(1.0 - tau)
+    first, second = 6.0 * tau * (1.0 - tau), 6.0 - 12.0 * tau
+    rise, rise2 = _part_rates(u, rest, 1.0 - early, dz >= 0.0)
+    along, along2 = rise, rise2
+    if early < 1.0:
+        along, along2 = _part_rates(u, rest, WAIT * (1.0 - early), dz < 0.0)
+    # sin^2(pi u) = X'(u) / 2
+    hump, hump2 = 0.5 * _cycloid_rates(u, rest)[1], 2.0 * np.pi**2 * np.cos(2.0 * np.pi * u)
+    up, up2 = dz * rise + lift * hump, dz * rise2 + lift * hump2
+    return dx * along * first, up * first, dx * (along2 * first**2 + along * second), up2 * first**2 + up * second
+
+
+@njit(cache=True)
+def _smooth(tau: float) -> float:
+    return tau * tau * (3.0 - 2.0 * tau)
+
+
+@njit(cache=True)
+def _cycloid(u: float) -> float:
     v = 2.0 * np.pi * u
-    w = v * v
+    if v >= 1.0:
+        return float((v - np.sin(v)) / (2.0 * np.pi))
     # Taylor series of v - sin v: the last term kept is below 1e-17 of the first for v < 1
-    series = np.ones_like(w)
+    w, series = v * v, 1.0
     for k in (16.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0):
         series = 1.0 - w / (k * (k + 1.0)) * series
-    small = v * w / 6.0 * series
-    return np.asarray(np.where(v < 1.0, small, v - np.sin(v)) / (2.0 * np.pi))
+    return v * w / 6.0 * series / (2.0 * np.pi)
 
 
-def _cycloid_rates(u: Array, rest: Array) -> tuple[Array, Array]:
+@njit(cache=True)
+def _cycloid_rates(u: float, rest: float) -> tuple[float, float]:
     """X'(u) = 1 - cos(2 pi u) and X''(u), with full relative precision at both ends; ``rest`` = 1 - u."""
-    near = np.minimum(u, rest)
-    slope = 2.0 * np.sin(np.pi * near) ** 2
-    return np.asarray(slope), np.asarray(np.where(u <= rest, 2.0, -2.0) * np.pi * np.sin(2.0 * np.pi * near))
+    near = min(u, rest)
+    turn = 2.0 * np.pi * np.sin(2.0 * np.pi * near)
+    return 2.0 * np.sin(np.pi * near) ** 2, turn if u <= rest else -turn
 
 
-def _smooth(tau: Array) -> Array:
-    return np.asarray(tau * tau * (3.0 - 2.0 * tau))
-
-
-def _part(u: Array, rest: Array, idle: Array, first: BoolArray) -> tuple[Array, Array, Array, Array]:
-    """A cycloid over all of u but an ``idle`` share at its end (``first``) or else at its beginning, 1 less it, and its
-    first two derivatives by u."""
+@njit(cache=True)
+def _parts(u: float, rest: float, idle: float, first: bool) -> tuple[float, float]:
+    """How much of a cycloid is over, and how much is left, that takes all of u but an ``idle`` share at its end
+    (``first``) or else at its beginning."""
     share = 1.0 - idle
-    from_start = np.where(first, u, np.maximum(u - idle, 0.0)) / share
-    to_end = np.where(first, np.maximum(rest - idle, 0.0), rest) / share
-    from_start, to_end = np.minimum(from_start, 1.0), np.minimum(to_end, 1.0)
-    slope, curve = _cycloid_rates(from_start, to_end)
-    return cycloid(from_start), cycloid(to_end), slope / share, curve / share**2
+    if first:
+        return min(u / share, 1.0), min(max(rest - idle, 0.0) / share, 1.0)
+    return min(max(u - idle, 0.0) / share, 1.0), min(rest / share, 1.0)
+
+
+@njit(cache=True)
+def _part_rates(u: float, rest: float, idle: float, first: bool) -> tuple[float, float]:
+    """First two derivatives by u of the cycloid of :func:`_parts`."""
+    over, left = _parts(u, rest, idle, first)
+    slope, curve = _cycloid_rates(over, left)
+    return slope / (1.0 - idle), curve / (1.0 - idle) ** 2

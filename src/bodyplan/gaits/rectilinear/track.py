@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from bodyplan.arrays import Array
 from bodyplan.errors import InputError
+from bodyplan.gaits.rectilinear.terrain import Steps
 from bodyplan.ground.base import Ground
 from bodyplan.ground.corridor import Corridor
 from bodyplan.ground.plane import Plane
@@ -22,8 +24,7 @@ class Track:
     """``ground`` along the way from ``origin`` (2,) m in direction ``heading`` rad; s m is the distance on it.
 
     ``level``: the same everywhere, with ``floor`` and ``ceiling`` m. For steps these hold where the way begins;
-    ``breaks`` (e,) m are the s of all steps, ``corners`` (k, 2) m the edges of the floor's, along and up; ``below`` and
-    ``above`` floor and ceiling as grounds of their own (None: open).
+    ``breaks`` (e,) m are the s of all steps, ``corners`` (k, 2) m the edges of the floor's, along and up.
     """
 
     ground: Ground
@@ -34,8 +35,6 @@ class Track:
     ceiling: float
     breaks: Array = field(default_factory=lambda: np.zeros(0))
     corners: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    below: Ground | None = None
-    above: Ground | None = None
 
     @classmethod
     def of(cls, ground: Ground, origin: tuple[float, float], heading: float) -> Track:
@@ -55,22 +54,9 @@ class Track:
             raise InputError(
                 f"Rectilinear: heading must be 0 on a profile with steps, which run across x; got {heading:.4g} rad."
             )
-        levels = ground.to_dict()
-        corners = [(x - origin[0], max(before, after)) for x, before, after in _steps(levels["floor"])]
-        lowest = min([floor, *(z for _, z in corners)])
-        above = None if levels["ceiling"] is None else Profile(lowest - 1e3, levels["ceiling"])
-        return cls(
-            ground,
-            origin,
-            heading,
-            False,
-            floor,
-            ceiling,
-            np.asarray(ground.breaks) - origin[0],
-            np.array(corners).reshape(-1, 2),
-            ground.floor_alone(),
-            above,
-        )
+        floor_x, floor_z = ground.floor_levels
+        corners = np.stack([floor_x - origin[0], np.maximum(floor_z[:-1], floor_z[1:])], axis=-1)
+        return cls(ground, origin, heading, False, floor, ceiling, np.asarray(ground.breaks) - origin[0], corners)
 
     @property
     def along(self) -> Array:
@@ -90,46 +76,29 @@ class Track:
         at = self.world(np.stack([s, 0.0 * s], axis=-1))
         return self.ground.height(at[..., 0], at[..., 1])
 
-    def lowest(self, low: Array, high: Array) -> Array:
-        """(...,) m: the least height between floor and ceiling from s = ``low`` to ``high`` (...,), each place by
-        itself; inf where it is open."""
-        starts, ends = np.append(-np.inf, self.breaks), np.append(self.breaks, np.inf)
-        out = np.full(np.shape(low), np.inf)
-        for a, b in zip(starts, ends, strict=True):
-            inside = 0.5 * (max(a, min(b, 0.0) - 1.0) + min(b, max(a, 0.0) + 1.0))
-            x = np.array(self.origin[0] + inside)
-            height = float(self.ground.ceiling_height(x)) - float(self.height(np.array(inside)))  # type: ignore[attr-defined]
-            out = np.where((low < b) & (high > a), np.minimum(out, height), out)
-        return out
-
     def ceiling_at(self, s: Array) -> Array:
         """Ceiling (...,) m at s; inf where it is open."""
         if not isinstance(self.ground, Profile):
             return np.full(np.shape(s), np.inf)
         return self.ground.ceiling_height(self.origin[0] + s)
 
-    def gaps(self, ends: Array) -> tuple[Array, Array, Array]:
-        """Distances (...,) m of segments ``ends`` (..., 2, 2), along and up, from the floor, from the ceiling and from
-        the nearest edge of the floor; inf where there is none."""
-        corner = np.full(ends.shape[:-2], np.inf)
-        ceiling = corner if self.above is None else self.above.segment_clearance(self.world(ends))
-        if len(self.corners):
-            start, way = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
-            square = np.sum(way * way, axis=-1)
-            for at in self.corners:
-                share = np.sum((at - start) * way, axis=-1) / np.where(square > 0.0, square, 1.0)
-                off = at - start - np.clip(share, 0.0, 1.0)[..., None] * way
-                corner = np.minimum(corner, np.hypot(off[..., 0], off[..., 1]))
-        return self.floor_gap(ends), ceiling, corner
-
-    def floor_gap(self, ends: Array) -> Array:
-        """Distances (...,) m of segments ``ends`` (..., 2, 2) from the floor."""
-        return np.asarray((self.below or self.ground).segment_clearance(self.world(ends)))
-
-
-def _steps(levels: float | list[list[float | None]] | None) -> list[tuple[float, float, float]]:
-    """(x, level before, level after) of every step; an open ceiling is at inf."""
-    if not isinstance(levels, list):
-        return []
-    heights = [np.inf if z is None else float(z) for _, z in levels]
-    return [(float(x or 0.0), a, b) for (x, _), a, b in zip(levels[1:], heights, heights[1:], strict=False)]
+    @cached_property
+    def steps(self) -> Steps:
+        """Floor and ceiling for kernels; of a level ground those at its place."""
+        if not isinstance(self.ground, Profile):
+            none, inf = np.zeros(0), np.full(1, np.inf)
+            return Steps(none, np.array([self.floor]), np.zeros((0, 2)), none, -inf, none, inf)
+        floor_x, floor_z = self.ground.floor_levels
+        roof_x, roof_z = self.ground.ceiling_levels
+        starts, ends = np.append(-np.inf, self.breaks), np.append(self.breaks, np.inf)
+        after, until = np.maximum(starts, np.minimum(ends, 0.0) - 1.0), np.minimum(ends, np.maximum(starts, 0.0) + 1.0)
+        inside = 0.5 * (after + until)
+        return Steps(
+            floor_x - self.origin[0],
+            np.array(floor_z),
+            np.ascontiguousarray(self.corners),
+            roof_x - self.origin[0],
+            -np.asarray(roof_z),
+            np.array(self.breaks),
+            self.ceiling_at(inside) - self.height(inside),
+        )

@@ -1,0 +1,223 @@
+"""A snake on steps: what its moves run into, and where an anchor can land."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.errors import Status
+from bodyplan.gaits.rectilinear.demands import MET, Demands
+from bodyplan.gaits.rectilinear.moves import Moves
+from bodyplan.gaits.rectilinear.snake import InchingSnake
+from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, land, try_moves
+from bodyplan.gaits.rectilinear.track import Track
+
+#: landing spots tried between standing and reach, and rounds that close in on the farthest good one with a few more
+SPOTS, CLOSER, ROUNDS = 20, 4, 2
+#: where among the spots that go those lie that are offered beside the farthest
+SHARES = (0.8, 0.55, 0.3, 0.0)
+#: places along a move at which it is tried, and those at which one that is kept is tried again
+PLACES, CLOSE = 25, 121
+#: shapes of a swing: what is added to its lift, in units of how far the ground on its way stands above its ends, and
+#: how early it rises
+SHAPES = ((0.0, 1.0), (0.0, 0.7), (0.0, 0.5), (0.0, 0.3), (1.0, 1.0), (1.0, 0.6), (1.6, 1.0), (1.6, 0.4))
+#: share of its height over a tread that a tail or head link keeps from the tread's edge
+OVER_EDGES = 0.9
+#: shares of a straight leg by which an anchor may be behind the place beyond an edge where the next one lands
+BRIDGES = (0.985, 0.95, 0.9)
+
+#: a place to land: where (2,) m, lift m and how early the swing rises
+Spot = tuple[Array, float, float]
+#: how often a demand or the ground was in the way of a move by name
+Why = Counter[tuple[str, Status]]
+
+
+@dataclass(frozen=True, eq=False)
+class Walker:
+    """A snake on steps: what its moves must keep to. ``lift`` m at least; ``margin`` m that the body keeps from the
+    edges of steps and from the ceiling. ``crouch`` m: a snake that is nearer than this to a low place moves as if it
+    were under it with its whole body (None: it may stand tall up to the edge). ``short`` (N - 1,) m: no leg is made
+    shorter where it need not be, so that the next anchor has room to rise."""
+
+    snake: InchingSnake
+    track: Track
+    demands: Demands
+    lift: float
+    margin: float
+    crouch: float | None = None
+    short: Array | None = None
+
+    @cached_property
+    def keeps(self) -> Keeps:
+        """What the body keeps from the ground."""
+        snake = self.snake
+        return Keeps(
+            float(snake.rest),
+            float(snake.body),
+            float(self.margin),
+            # tail and head links lie as low as the feet and may hang over an edge
+            min(float(self.margin), OVER_EDGES * max(float(snake.rest - snake.body), 0.0)),
+            float(snake.top),
+            float(snake.tail),
+            float(snake.head),
+            np.nan if self.crouch is None else float(self.crouch),
+            float(self.lift),
+            float(snake.links.max()),
+        )
+
+    def stand(self, s: Array) -> Array:
+        """Anchors (..., N, 2) along and up, standing at s (..., N) m."""
+        return np.stack([s, self.track.height(s) + self.snake.rest], axis=-1)
+
+    def tried(self, moves: Moves, places: Array, only: int | None = None) -> list[Status]:
+        """The first demand, floor or ceiling that each move runs into at ``places`` (p,) of tau, or ok. ``only``: the
+        one anchor that moves in all of them; what does not move with it has been tried before."""
+        found = self._into(moves, places, only, True)
+        told = np.arange(len(TRIED))
+        if np.isfinite(self.demands.ceiling):  # a ceiling of its own is told in its place among the demands
+            found[:, TRIED.index(Status.ABOVE_CEILING)] |= found[:, told[-1]]
+        return [next((TRIED[k] for k in np.flatnonzero(row)), Status.OK) for row in found]
+
+    def sound(self, moves: Moves) -> BoolArray:
+        """(M,) True for the moves that run into nothing at many places, with the whole body."""
+        return np.asarray(~self._into(moves, _CLOSE, None, False).any(axis=1))
+
+    def _into(self, moves: Moves, places: Array, only: int | None, every: bool) -> BoolArray:
+        """(M, 9): what each move runs into, all of it with ``every``, else the first thing that is found."""
+        out = np.empty((len(moves), len(TRIED)), dtype=bool)
+        who = -1 if only is None else int(only)
+        try_moves(
+            self.demands.bounds, self.track.steps, self.keeps, *moves.tables, moves.swinging, places, who, MET, every,
+            out,
+        )  # fmt: skip
+        return out
+
+    def shaped(self, here: Array, i: int, spot: Array) -> tuple[Spot, Status]:
+        """The swing of anchor ``i`` of ``here`` (N, 2) to ``spot`` (2,) in the first shape that goes; with the first
+        reason against the plainest where none does."""
+        which, made = self._land(here, i, spot[None])
+        if which[0] >= 0:
+            return (spot, float(made[0, 0]), float(made[0, 1])), Status.OK
+        return (spot, self.lift, 1.0), self._plainest(here, i, spot[None])[0]
+
+    def _land(self, here: Array, i: int, spots: Array) -> tuple[IntArray, Array]:
+        which, made = np.empty(len(spots), dtype=np.int64), np.zeros((len(spots), 2))
+        land(
+            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _SHAPES, _ORDER,
+            MET, made, which,
+        )  # fmt: skip
+        return which, made
+
+    def _plainest(self, here: Array, i: int, spots: Array) -> list[Status]:
+        """What is against the plainest swings of anchor ``i`` to ``spots`` (K, 2)."""
+        before = np.repeat(here[None], len(spots), axis=0)
+        after, lift = before.copy(), np.zeros(before.shape[:2])
+        after[:, i], lift[:, i] = spots, self.lift
+        moves = Moves(before, after, lift, np.ones(lift.shape), ("",) * len(spots))
+        return self.tried(moves, np.linspace(0.0, 1.0, PLACES), i)
+
+    def why(self, here: Array, i: int, name: str) -> Why:
+        """What is against the landing spots of anchor ``i`` of ``here`` (N, 2)."""
+        out: Why = Counter()
+        spots = self.stand(self._spots(here, i))
+        if not len(spots):
+            out[name, Status.OUT_OF_REACH] += 1
+            return out
+        after = np.repeat(here[None], len(spots), axis=0)
+        after[:, i] = spots
+        none = np.zeros(after.shape[:2])
+        stands = self.tried(Moves(after, after, none, none + 1.0, ("",) * len(spots)), np.zeros(1), i)
+        out.update((name, status) for status in stands if status != Status.OK)
+        good = spots[np.flatnonzero([status == Status.OK for status in stands])]
+        if len(good):
+            which, _ = self._land(here, i, good)
+            left = good[which < 0]
+            out.update((name, status) for status in (self._plainest(here, i, left) if len(left) else []))
+        return out
+
+    def options(self, here: Array, i: int) -> list[Spot]:
+        """Where anchor ``i`` of ``here`` (N, 2) may land, with the lift and shape of its swing, the farthest first."""
+        at = self._spots(here, i)
+        if not len(at):
+            return []
+        roomy = self._roomy(here, i, at)
+        found = self._landings(here, i, at[roomy])
+        if not found:
+            found = self._landings(here, i, at[~roomy])
+        if not found:
+            return []
+        # closer to the farthest that goes than the grid: what is lost here is lost in every cycle
+        far, step = self._reach(here, i), (self._reach(here, i) - here[i, 0]) / SPOTS
+        for _ in range(ROUNDS):
+            tried = found[-1][0][0] + step * np.arange(1, CLOSER + 1) / (CLOSER + 1)
+            inside = (tried < far) & self._roomy(here, i, tried)
+            found += self._landings(here, i, tried[inside])
+            step /= CLOSER + 1
+        last, edges = len(found) - 1, self._beside_edges[i]
+        chosen = {last, *(round(share * last) for share in SHARES)}
+        chosen |= {m for m, spot in enumerate(found) if np.any(np.abs(edges - spot[0][0]) < 1e-12)}
+        return [found[m] for m in sorted(chosen, reverse=True)]
+
+    def _spots(self, here: Array, i: int) -> Array:
+        """Places (K,) m where anchor ``i`` might land."""
+        at, far = here[i, 0], self._reach(here, i)
+        edges = self._beside_edges[i]
+        even = at + (far - at) * np.arange(1, SPOTS + 1) / SPOTS if far > at else np.zeros(0)
+        return np.concatenate([even, edges[(edges > at) & (edges < far)]])
+
+    def _landings(self, here: Array, i: int, at: Array) -> list[Spot]:
+        """The spots ``at`` (K,) m on which anchor ``i`` can land, with lift and shape, the farthest last."""
+        if not len(at):
+            return []
+        spots = self.stand(np.sort(at))
+        which, made = self._land(here, i, spots)
+        return [(spots[k], float(made[k, 0]), float(made[k, 1])) for k in np.flatnonzero(which >= 0)]
+
+    def _roomy(self, here: Array, i: int, at: Array) -> BoolArray:
+        """(K,) True where anchor ``i`` at ``at`` (K,) m makes no leg of ``here`` too short for the next move."""
+        out = np.ones(len(at), dtype=bool)
+        if self.short is not None:
+            if i > 0:
+                out &= at - here[i - 1, 0] >= self.short[i - 1] * (1.0 - 1e-9)
+            if i < len(here) - 1:
+                out &= here[i + 1, 0] - at >= self.short[i] * (1.0 - 1e-9)
+        return out
+
+    def _reach(self, here: Array, i: int) -> float:
+        """m: what anchor ``i`` cannot pass: the reach of the leg behind it, and the anchor ahead."""
+        far = np.inf
+        if i > 0:
+            far = min(far, here[i - 1, 0] + self.demands.straight[i - 1])
+        if i < len(here) - 1:
+            far = min(far, here[i + 1, 0] - self.demands.nearest)
+        return float(max(far, here[i, 0]))
+
+    @cached_property
+    def _beside_edges(self) -> list[Array]:
+        """For every anchor the places that matter at the edges of steps: feet beside them, tail and head links clear of
+        them, and those from which the next anchor reaches beyond them."""
+        snake, keep = self.snake, self.snake.rest + self.margin
+        out = []
+        for i in range(snake.anchors):
+            offsets = [keep, -keep]
+            if i == snake.anchors - 1:
+                offsets.append(-snake.head - snake.body - self.margin)
+            if i == 0:
+                offsets.append(snake.tail + snake.body + self.margin)
+            if i < snake.anchors - 1:
+                offsets += [keep - share * float(self.demands.straight[i]) for share in BRIDGES]
+            out.append(np.unique([edge + offset for edge in self.track.breaks for offset in offsets]))
+        return out
+
+
+def _halved(count: int) -> Array:
+    """``count`` places from 0 to 1, coarse ones first and 0 last: what a move runs into shows early."""
+    turned = [int(f"{k:032b}"[::-1], 2) if k else 1 << 32 for k in range(count)]
+    return np.linspace(0.0, 1.0, count)[np.argsort(turned, kind="stable")]
+
+
+_SHAPES, _ORDER, _CLOSE = np.array(SHAPES), _halved(PLACES), _halved(CLOSE)
