@@ -220,12 +220,12 @@ def test_time_in_the_air_is_that_of_free_fall() -> None:
     ends = np.flatnonzero(np.diff(np.concatenate([[0], falling, [0]])))
     flights = np.diff(ends.reshape(-1, 2), axis=1)  # ms
     assert flights.max() > 100 and float(told[2]) == pytest.approx(1e-3 * flights.max(), abs=0.005)
-    real = flights[flights > 6]
+    real = flights[flights >= 30]
     blurred = 100.0 * 6.0 * len(real) / len(trial.t)  # ms: stiff contacts let go before they part
     assert float(told[1]) == pytest.approx(100.0 * real.sum() / len(trial.t), abs=blurred)
-    # bodies that lie or slide are not, whatever their stiff contacts do
+    # bodies that lie or slide are not, however their stiff contacts chatter
     plane, pose = downhill(0.3, 0.4)
-    for shape, mu in (("box", 0.1), ("box", 1.0), ("capsule", 1.0)):
+    for shape, mu in (("box", 0.1), ("box", 1.0), ("capsule", 0.1), ("capsule", 1.0)):
         assert simulate(still(block(shape), plane, 0.8, pose), friction=mu, ramp=0.0).warnings == ()
 
 

@@ -14,7 +14,6 @@ from bodyplan.simulate.measure import Airborne, Meter, Records, Sliding
 from bodyplan.simulate.model import Physics
 from bodyplan.simulate.reference import Reference
 from bodyplan.simulate.start import CLOSING, Walls
-from bodyplan.simulate.terrain import CONTACT_STEPS
 
 #: norm of all velocities (rad/s and m/s) beyond which the physics has left the real world
 RUNAWAY = 1e4
@@ -102,7 +101,7 @@ class Run:
         self._qpos = np.zeros((size, model.nq))
         self._t, self._com, self._force = np.zeros(size), np.zeros((size, 3)), np.zeros((size, model.nu))
         self._touch = np.zeros((size, len(physics.wheels.pointers)))
-        self.airborne, self._count = Airborne(physics, round(CONTACT_STEPS)), 0
+        self.airborne, self._count = Airborne(physics), 0
 
     def go(self) -> None:
         """Run to the end, or until the physics diverges (then ``failure`` says how)."""

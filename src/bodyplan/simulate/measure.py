@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,8 @@ NOWHERE = 1e-9
 #: planned turn below which a motion is not meant to turn, rad, and horizontal part of the base's x axis below which it
 #: has no heading
 STRAIGHT, NO_HEADING = 0.1, 0.1
+#: s: the shortest flight; a body that falls as long has hopped a millimetre high
+HOP = 0.03
 
 
 class Meter:
@@ -99,12 +102,13 @@ class Sliding:
 
 
 class Airborne:
-    """Time steps without contact with the ground. A stiff contact at rest chatters: within its time constant, ``lull``
-    time steps, it may let go without a flight; what is shorter does not count."""
+    """Time steps without contact with the ground, in flights of at least :data:`HOP`: stiff contacts chatter, and what
+    slides fast hops a little."""
 
-    def __init__(self, physics: Physics, lull: int) -> None:
+    def __init__(self, physics: Physics) -> None:
         self.steps, self.longest = 0, 0
-        self._lull, self._now, self._ground = lull, 0, physics.solid_geoms
+        self._least, self._now = math.ceil(HOP / physics.model.opt.timestep), 0
+        self._ground = physics.solid_geoms
         pairs = np.stack([physics.model.pair_geom1, physics.model.pair_geom2], axis=-1)
         self._elsewhere = not np.isin(pairs, self._ground).any(axis=-1).all()
 
@@ -114,8 +118,8 @@ class Airborne:
             self._now = 0
             return
         self._now += 1
-        if self._now >= self._lull:
-            self.steps += self._lull if self._now == self._lull else 1
+        if self._now >= self._least:
+            self.steps += self._least if self._now == self._least else 1
             self.longest = max(self.longest, self._now)
 
 
