@@ -3,6 +3,7 @@
 from bodyplan.fitting.angles import JointAngles
 from bodyplan.fitting.convergence import Convergence, ConvergenceRow, convergence
 from bodyplan.fitting.fits import Fit, Turning, fit
+from bodyplan.fitting.following import largest_distances
 from bodyplan.fitting.links import ExactLength, LinksFit, exact_link_length, links_on_curve
 from bodyplan.fitting.mechanism import Mechanism, mechanism
 from bodyplan.fitting.rules import GAUSS_P, Bends, Rule, rule
@@ -22,6 +23,7 @@ __all__ = [
     "convergence",
     "exact_link_length",
     "fit",
+    "largest_distances",
     "links_on_curve",
     "mechanism",
     "rule",

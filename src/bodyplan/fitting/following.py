@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.curves.base import BodyCurve
 from bodyplan.fitting.dense import DenseCurve, dense_curve
 from bodyplan.fitting.distance import CELL_TOLERANCE, errors, farthest
-from bodyplan.fitting.mechanism import Mechanism
+from bodyplan.fitting.mechanism import Mechanism, mechanism
 from bodyplan.fitting.rules import kink_quaternion
 from bodyplan.robot.batch import variable
 from bodyplan.robot.elements import Arc
@@ -63,7 +64,11 @@ class Following:
 
     def farthest(self, q: Array, kink: Array) -> Array:
         """(T,) m: the largest distance."""
-        data = segment_data(self.robot, self.made, q, self.base(kink))
+        return self.farthest_from(q, self.base(kink))
+
+    def farthest_from(self, q: Array, base: Array) -> Array:
+        """(T,) m: the same for base poses (T, 7) in the dense curve's own frame."""
+        data = segment_data(self.robot, self.made, q, base)
         out = np.empty(len(q))
         cells = (self.stops, self.counts, self.owners, self.segments, data)
         farthest(self.starts, *cells, self.dense.ends, self.dense.cells, out)
@@ -85,6 +90,18 @@ def followings(robot: Robot, made: Mechanism, curve: BodyCurve, starts: Array) -
         begin = starts[group]
         dense = dense_curve(curve, float(begin.min()), float(begin.max()) + made.length, made.length)
         out.append((group, Following(robot, made, dense, begin, *_cells(made, dense, begin))))
+    return out
+
+
+def largest_distances(robot: Robot, curve: BodyCurve, starts: ArrayLike, q: Array, turns: Array) -> Array:
+    """(T,) m: the largest distance, at equal body length, between ``curve`` (tau = 0) from ``starts`` (T,) m on and the
+    mechanism at joints ``q`` (T, n) whose base is turned by quaternions ``turns`` (T, 4) against the curve's frame
+    there."""
+    begin = np.ascontiguousarray(starts, dtype=np.float64)
+    out = np.empty(len(begin))
+    for group, found in followings(robot, mechanism(robot), curve, begin):
+        turned = np.concatenate([np.zeros((len(group), 3)), turns[group]], axis=1)
+        out[group] = found.farthest_from(q[group], compose(found.dense.pose(found.starts), turned))
     return out
 
 

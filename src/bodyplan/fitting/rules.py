@@ -169,7 +169,8 @@ def _two(shape: tuple[Array, Array, Array]) -> Array:
 def _times(phi: Array, weights: Any) -> Array:
     """(..., K) by the weights (J, K)."""
     if isinstance(weights, np.ndarray):
-        return np.asarray(phi @ weights.T)
+        # BLAS wants numbers side by side
+        return np.asarray(np.ascontiguousarray(phi) @ weights.T)
     return np.asarray((weights @ phi.reshape(-1, phi.shape[-1]).T).T).reshape(*phi.shape[:-1], -1)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from bodyplan.gaits.touching import lowest_points
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.model import Robot
-from bodyplan.spatial import compose, quaternion_from_matrix
+from bodyplan.spatial import compose, multiply, quaternion_from_matrix
 from bodyplan.spatial.poses import IDENTITY
 
 if TYPE_CHECKING:
@@ -113,6 +113,13 @@ class Following:
         off = np.linalg.norm(points - poses[probes, :3], axis=-1)
         return np.asarray(np.interp(np.arange(len(s)), probes, off))
 
+    def farthest(self, sigma: ArrayLike, joints: Joints, roll: Array) -> float:
+        """m: largest distance that the mechanism leaves to the curve with its tail at ``sigma`` (T,) m, its base rolled
+        there by ``roll`` (T,) rad against the curve's frame."""
+        turns = multiply(rolled(roll)[:, 3:], joints.kink)
+        places = np.broadcast_to(sigma, np.shape(roll))
+        return float(fitting.largest_distances(self.robot, self.curve, places, joints.q, turns).max())
+
     def follows(self, pose: Array, places: Array, distance: float, label: str = "frames on the body curve") -> Claim:
         """The claim that the frames are on the curve at ``places`` (T, F) m when its s = 0 lies at ``pose``, as near as
         this mechanism can be: ``distance`` m is the largest that fits to the curve leave."""
@@ -161,15 +168,15 @@ class Following:
         return np.where(beyond, Status.LIMIT.value, Status.OK.value).astype("U24")
 
 
+def through_cycle(period: float) -> Array:
+    """(FITS,) s at which the distances of a cycle are taken."""
+    return np.linspace(0.0, period, FITS)
+
+
 def closes(period: float, advance: ArrayLike, turn: ArrayLike) -> Claim:
     """The claim that the cycle closes: after ``period`` s the base is moved as p -> R(turn) p + advance."""
     data = {"period": period, "advance": advance, "turn": turn, "tolerance": CLOSED}
     return Claim("periodic", "the cycle closes", data)
-
-
-def farthest_in_cycle(fit_at: Callable[[float], Any], period: float) -> float:
-    """m: largest distance that the fits of a cycle leave to their curves."""
-    return max(float(fit_at(float(t)).max_distance) for t in np.linspace(0.0, period, FITS))
 
 
 def fit_facts(fit: Any) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,13 +20,13 @@ from bodyplan.gaits.following import (
     Following,
     Joints,
     closes,
-    farthest_in_cycle,
     fit_facts,
     in_time,
     peaks,
     rest_on_floor,
     rolled,
     rule_notes,
+    through_cycle,
     with_kink,
 )
 from bodyplan.gaits.touching import pole_gaps
@@ -147,6 +147,7 @@ class Rolling(Gait):
         path[:, 2] += rise
         up = np.array([0.0, 0.0, rise])
         step = twists.exp(self.period(robot) * body.motion)
+        cycle = through_cycle(self.period(robot))
         places = np.broadcast_to(following.stations, (len(t), len(following.stations)))
         grip: dict[str, Any] = {"speed": abs(self.rate) * body.radius, "tolerance": CREEP}
         contacts = None
@@ -164,7 +165,7 @@ class Rolling(Gait):
             following.follows(
                 path,
                 places,
-                farthest_in_cycle(partial(self.fit_at, robot), self.period(robot)),
+                following.farthest(0.0, body.joints(cycle), -self.rate * cycle),
                 "frames on the curve that stays in space",
             ),
             closes(self.period(robot), apply(step, -up) + up, self.period(robot) * body.motion[3:]),

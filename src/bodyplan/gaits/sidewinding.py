@@ -20,13 +20,13 @@ from bodyplan.gaits.following import (
     Following,
     Joints,
     closes,
-    farthest_in_cycle,
     fit_facts,
     in_time,
     peaks,
     rest_on_floor,
     rolled,
     rule_notes,
+    through_cycle,
     with_kink,
 )
 from bodyplan.gaits.pace import Pace
@@ -35,13 +35,15 @@ from bodyplan.gaits.touching import touching
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim, Motion
 from bodyplan.robot.model import Robot
-from bodyplan.spatial import compose, quaternion_from_matrix
+from bodyplan.spatial import GAUSS_NODES, compose, frames_from_nodes, quaternion_from_matrix
 from bodyplan.spatial.poses import IDENTITY
 
 #: share of the lift within which a contact counts as touching
 TOUCH = 0.1
 #: share of the speed along the body that what touches may have (mean)
 CREEP = 0.4
+#: steps over half a wavelength with which the torsion is followed from small amplitudes on
+HALF = 64
 
 
 class Sidewinding(Gait):
@@ -158,7 +160,8 @@ class Sidewinding(Gait):
         covers = float(t[-1] - t[0]) >= 0.95 * self.period(robot)
         contacts, _, within = touching(heights, TOUCH * lift if self.touch is None else self.touch, covers)
         # the torsion does not move the points of the curve
-        farthest = farthest_in_cycle(partial(self.fit_at, robot), self.period(robot))
+        cycle = self.pace.at(through_cycle(self.period(robot)))
+        farthest = following.farthest(cycle[0], body.joints(*cycle), -body.turned(cycle[0]))
         claims = [following.follows(path, sigma[:, None] + following.stations, farthest)]
         claims.append(closes(self.period(robot), level.advance, 0.0))
         if robot.contacts:
@@ -303,18 +306,27 @@ def _torsion(gait: Sidewinding) -> float:
     where the quaternion of H has no x: one equation for one torsion.
     """
     wave = gait.wavelength
+    # for the way to the amplitudes the wave is taken at fixed places; its torsion is one number beside it
+    h = 0.5 * wave / HALF
+    places = (h * np.arange(HALF)[:, None] + h * np.array(GAUSS_NODES)).ravel()
+    full, steps = np.stack(_wave(gait, 0.0).shape(places), axis=-1).reshape(HALF, 3, 3), np.full(HALF, h)
+    twist = np.array([1.0, 0.0, 0.0])
 
-    def roll(share: float, torsion: float) -> float:
-        frame = _wave(gait, torsion, share=share).frames(np.array([0.5 * wave]), IDENTITY, tolerance=1e-13)[1][0]
+    def near(share: float, torsion: float) -> float:
+        return float(frames_from_nodes(share * full + torsion * twist, steps)[-1, 4])
+
+    def roll(torsion: float) -> float:
+        frame = _wave(gait, torsion).frames(np.array([0.5 * wave]), IDENTITY, tolerance=1e-13)[1][0]
         return float(quaternion_from_matrix(frame)[1])
 
     # of several torsions the one that grows from 0 with the amplitudes, at first with their product
-    steps = int(np.ceil(20.0 * (abs(gait.alpha_yaw) + abs(gait.alpha_pitch)))) + 1
-    torsion: float = -np.pi * gait.alpha_yaw * gait.alpha_pitch * np.sin(gait.phase) / (wave * steps**2)
-    for k in range(1, steps + 1):
-        share = k / steps
+    count = int(np.ceil(20.0 * (abs(gait.alpha_yaw) + abs(gait.alpha_pitch)))) + 1
+    torsion: float = -np.pi * gait.alpha_yaw * gait.alpha_pitch * np.sin(gait.phase) / (wave * count**2)
+    for k in range(1, count + 1):
         guess = torsion * (k / max(k - 1, 1)) ** 2
-        found = _secant(lambda x, f=share: roll(f, x), guess, 1e-4 / wave)  # type: ignore[misc]
+        found = _secant(partial(near, k / count), guess, 1e-4 / wave)
+        if k == count and found is not None:
+            found = _secant(roll, found, 1e-4 / wave)
         jumps = found is None or abs(found - guess) > 0.3 * abs(guess) + 0.05 / wave
         if found is None or jumps or abs(found) * wave >= np.pi:
             raise InputError(
