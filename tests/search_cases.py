@@ -29,11 +29,11 @@ def alone(point, simulate=True, text=MISSION):
     return row.status, dict(row.figures)
 
 
-def poisoned(version, payload, overrides, simulate):
+def poisoned(version, payload, overrides, simulate, bounds=None):
     """What a worker does with a point that ends its process, and with all others."""
     if "gait.omega=1.4" in overrides and 'ground.width="160 mm"' in overrides:
         os.kill(os.getpid(), signal.SIGKILL)
-    return evaluate(payload, overrides, simulate)
+    return evaluate(payload, overrides, simulate, bounds)
 
 
 def lines(folder):
@@ -44,8 +44,8 @@ def lines(folder):
 @contextmanager
 def cluster_of_processes(folder, workers):
     """Address of a scheduler and the processes of its workers, all on the loopback interface."""
-    tests = str(Path(__file__).parent)
-    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "PYTHONPATH": tests}
+    paths = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(paths)}
     started = []
 
     def start(*arguments):

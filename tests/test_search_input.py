@@ -247,6 +247,28 @@ def test_what_becomes_of_a_point(change, status):
         assert row.figures["check.failed"] == float(status != "ok") and row.figures["plan.speed"] > 0.0
 
 
+def test_what_the_plan_misses_already_is_not_executed(monkeypatch):
+    """Bounds on the plan and checks come before physics, in an optimisation; a sweep executes what it can."""
+    payload, done = payload_of(mission()), []
+
+    def executed(mission, motion):
+        done.append(motion)
+
+    monkeypatch.setattr("bodyplan.search.point.simulate_mission", executed)
+    monkeypatch.setattr("bodyplan.search.point.figures_of", lambda motion, trial: {"trial.speed_m_s": 1.0})
+    facts = evaluate(payload, (), simulate=False).figures
+    speed = facts["plan.speed"]
+    wanted = [bound_of(text, ("speed",), 1, True) for text in (f"plan.speed >= {1.1 * speed}", "trial.speed >= 2")]
+    assert [bound.of_plan for bound in wanted] == [True, False]
+    row = evaluate(payload, (), True, wanted)
+    assert row.status == "out_of_bounds" and not done and "plan.speed >= " in row.reason and row.figures == facts
+    assert violations(row, wanted)[wanted[0].text] == pytest.approx(0.1 / 1.1)
+    assert evaluate(payload, (), True, wanted[1:]).ok and len(done) == 1
+    slow = ("robot.rate=1.0",)
+    assert evaluate(payload, slow, True, ()).status == "check_failed" and len(done) == 1
+    assert evaluate(payload, slow, True).status == "check_failed" and len(done) == 2
+
+
 def test_a_point_that_fails_in_a_way_of_its_own(monkeypatch):
     def broken(mission):
         raise ZeroDivisionError("of its own")

@@ -16,6 +16,7 @@ from typing import Any
 
 from bodyplan import __version__
 from bodyplan.errors import BodyplanError, InputError, MissingExtraError
+from bodyplan.search.measures import Bound
 from bodyplan.search.payload import Payload
 from bodyplan.search.point import Row, evaluate
 
@@ -46,8 +47,11 @@ class Pool:
     def __init__(self, client: Any) -> None:
         self._client = client
 
-    def rows(self, payload: Payload, jobs: Iterable[Job], simulate: bool) -> Iterator[tuple[str, Row]]:
-        """Key and row of each of ``jobs`` in the order in which they are finished, each exactly once.
+    def rows(
+        self, payload: Payload, jobs: Iterable[Job], simulate: bool, bounds: Sequence[Bound] | None = None
+    ) -> Iterator[tuple[str, Row]]:
+        """Key and row of each of ``jobs`` in the order in which they are finished, each exactly once; ``bounds`` as
+        :func:`evaluate`.
 
         A worker that ends costs no point: another one takes it. A point that ends several of them is tried once more at
         the end, alone, since it may have been with the one that did; then it is "lost". Raises BodyplanError where the
@@ -55,16 +59,16 @@ class Pool:
         """
         asked = {key: tuple(overrides) for key, overrides in jobs}
         lost: list[str] = []
-        for key, row in self._rows(payload, asked, simulate, ""):
+        for key, row in self._rows(payload, asked, (simulate, bounds), ""):
             if row.status == "lost":
                 lost.append(key)
             else:
                 yield key, row
         for key in lost:
-            yield from self._rows(payload, {key: asked[key]}, simulate, "-alone")
+            yield from self._rows(payload, {key: asked[key]}, (simulate, bounds), "-alone")
 
     def _rows(
-        self, payload: Payload, jobs: Mapping[str, tuple[str, ...]], simulate: bool, again: str
+        self, payload: Payload, jobs: Mapping[str, tuple[str, ...]], how: tuple[Any, ...], again: str
     ) -> Iterator[tuple[str, Row]]:
         # a task of its own, so that a worker that comes late or again gets the files from the scheduler's recipe
         sent: Any = payload
@@ -79,7 +83,7 @@ class Pool:
             if job is not None:
                 key, overrides = job
                 name = f"bodyplan-point-{key}{again}"
-                future = self._client.submit(on_worker, __version__, sent, overrides, simulate, key=name)
+                future = self._client.submit(on_worker, __version__, sent, overrides, *how, key=name)
                 keys[future] = key
                 done.add(future)
             return job is not None
@@ -119,7 +123,9 @@ def _row_of(future: Any) -> Row:
     return row
 
 
-def on_worker(version: str, payload: Payload, overrides: Sequence[str], simulate: bool) -> Row:
+def on_worker(
+    version: str, payload: Payload, overrides: Sequence[str], simulate: bool, bounds: Sequence[Bound] | None = None
+) -> Row:
     """The row of a point, in a worker process. Raises VersionError in one of another version."""
     if version != __version__:
         raise VersionError(
@@ -128,7 +134,7 @@ def on_worker(version: str, payload: Payload, overrides: Sequence[str], simulate
     from numba import config
 
     config.NUMBA_NUM_THREADS = 1  # type: ignore[attr-defined]  # workers share the machine; see bodyplan.threads
-    return evaluate(payload, overrides, simulate)
+    return evaluate(payload, overrides, simulate, bounds)
 
 
 @contextmanager

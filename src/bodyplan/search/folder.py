@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from bodyplan import __version__
 from bodyplan.errors import InputError, MissingExtraError
 from bodyplan.files import refuse_folder, replacing
+from bodyplan.search.measures import Bound
 from bodyplan.search.payload import Payload
 from bodyplan.search.store import Store, store_at
 from bodyplan.search.table import Table, needs_parquet, write_csv, write_parquet
@@ -32,8 +33,9 @@ WRITTEN = (
 )
 
 
-def settings_of(simulate: bool) -> dict[str, Any]:
-    """What a point's row depends on besides its mission."""
+def settings_of(simulate: bool, bounds: Sequence[Bound] | None = None) -> dict[str, Any]:
+    """What a point's row depends on besides its mission; ``bounds``: what a plan has to keep to be executed,
+    beside its checks; None where all are executed."""
     versions: dict[str, Any] = {"bodyplan": __version__}
     if simulate:
         from importlib.metadata import PackageNotFoundError, version
@@ -42,7 +44,8 @@ def settings_of(simulate: bool) -> dict[str, Any]:
             versions["mujoco"] = version("mujoco")
         except PackageNotFoundError as error:
             raise MissingExtraError("mujoco", "physics", "simulation (or search with --no-simulate)") from error
-    return {"simulate": simulate, "versions": versions}
+    first = {} if bounds is None else {"bounds": [bound.text for bound in bounds]}
+    return {"simulate": simulate, "versions": versions, **first}
 
 
 @contextmanager

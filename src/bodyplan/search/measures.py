@@ -60,6 +60,11 @@ class Bound:
     at_least: bool
 
     @property
+    def of_plan(self) -> bool:
+        """True where plan and checks decide it, without physics."""
+        return not any(name.startswith("trial.") for name in self.measure.names)
+
+    @property
     def text(self) -> str:
         """ "trial.peak_torque_Nm <= 1.2"."""
         return f"{self.measure.text} {'>=' if self.at_least else '<='} {self.limit:.12g}"

@@ -121,8 +121,9 @@ def optimise(
 
     ``vary``: texts "gait.overlap=0:0.8", "gait.omega=0.5:4:log", "gait.blend=linear,smooth", or a mapping from fields
     to such specs or to (low, high). ``maximise``, ``minimise``: figures ("trial.speed"); two of them give a front.
-    ``subject_to``: bounds "trial.peak_torque<=1.2"; a point whose checks fail is out in any case. ``trials`` in all, in
-    whole batches of ``batch``. ``sampler``: "tpe" (default), "cmaes", "nsga2" (default for two objectives), "random".
+    ``subject_to``: bounds "trial.peak_torque<=1.2"; a point whose checks fail is out in any case, and is not executed,
+    nor is one whose plan misses a bound. ``trials`` in all, in whole batches of ``batch``. ``sampler``: "tpe"
+    (default), "cmaes", "nsga2" (default for two objectives), "random".
     ``storage``: any database URL that Optuna takes (default: study.db in the folder). What is found depends on
     ``seed`` and ``batch``, not on the workers. The rest as :func:`bodyplan.sweep`; the same call goes on where it was
     stopped, and one with more ``trials`` adds to them.
@@ -134,7 +135,6 @@ def optimise(
     _numbers(trials, seed, batch)
     payload = payload_of(mission)
     simulate = simulate and mission.simulate is not None
-    settings = settings_of(simulate)
     data = tomllib.loads(payload.text)
     vary = dict(vary) if isinstance(vary, Mapping) else [vary] if isinstance(vary, str) else list(vary)
     names = [str(item).partition("=")[0].strip() for item in vary]
@@ -145,6 +145,9 @@ def optimise(
     middle = [tuple(values[0].override(key) for key, values in ends.items())]
     check_fields(payload, ends, middle, simulate, "--vary")
     objectives, bounds = demands_of(mission, maximise, minimise, subject_to, simulate)
+    # what is out already by its plan is not worth the physics
+    first = tuple(bound for bound in bounds if bound.of_plan) if simulate else None
+    settings = settings_of(simulate, first)
     chosen = sampler_named(sampler, objectives, ranges)
     total = -(-trials // batch) * batch
     folder = Path(out) if out is not None else Path("runs") / f"optimise-{mission.name}"
@@ -213,7 +216,7 @@ def optimise(
                 if missing:
                     ready = ready or stack.enter_context(pool(workers, scheduler))
                     jobs = [(key, changed) for key, (changed, _) in missing.items()]
-                    for key, row in ready.rows(payload, jobs, simulate):
+                    for key, row in ready.rows(payload, jobs, simulate, first):
                         store.add(key, row, missing[key][1])
                         found.update({n: row for n, (_, mine, _, _) in under_way.items() if mine == key})
                         tell_progress()
