@@ -5,7 +5,8 @@ import pytest
 
 import bodyplan as bp
 from bodyplan.errors import InputError
-from bodyplan.gaits.crawl.legs import Legs, bent, cross, direction, solved, stance_guess
+from bodyplan.gaits.crawl import leg_kernel
+from bodyplan.gaits.crawl.legs import Legs, bent, cross, direction, stance_guess
 from bodyplan.robot import Arc, Joint, Row
 from crawl_cases import random_legs
 from robot_cases import frame_matrices
@@ -42,6 +43,15 @@ def foot_jacobian(robot, q):
     return np.stack([feet(robot, q + 1j * STEP * axis).imag / STEP for axis in np.eye(robot.n)], axis=-1)
 
 
+def moves(legs, j, q):
+    """Place (3,) of foot ``j`` and its Jacobian (3, 3), by the kernels."""
+    frames, _ = leg_kernel.room(legs.tables)
+    foot, square = np.empty(3), np.empty((3, 3))
+    leg_kernel.chain(legs.tables, j, q, frames)
+    leg_kernel.moves(legs.tables, j, frames, foot, square)
+    return foot, square
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_feet_and_their_derivatives(seed):
     legs, q, _ = legs_of(seed)
@@ -52,6 +62,9 @@ def test_feet_and_their_derivatives(seed):
     for j, leg in enumerate(legs.legs):
         *_, columns = leg.jacobian(poses)
         assert np.abs(leg.square(columns)[0] - jacobian[j][:, leg.columns]).max() < 1e-13
+        foot, square = moves(legs, j, q)
+        assert np.abs(foot - feet(robot, q).real[j]).max() < 1e-13
+        assert np.abs(square - jacobian[j][:, leg.columns]).max() < 1e-13
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -85,10 +98,12 @@ def test_rates_and_accelerations(seed):
     drift = (ahead - behind) @ qd[0] / (2 * h)
     size = 1.0 + np.abs(drift).max()
     assert np.abs(jacobian @ qdd[0] + drift - acceleration[0]).max() < 1e-7 * size
-    poses = robot.forward(q[None]).array
-    for j, leg in enumerate(legs.legs):
-        axis, place, foot, _ = leg.jacobian(poses)
-        assert np.abs(leg.drift(axis, place, foot, leg.drive_rates(qd))[0] - drift[j]).max() < 1e-7 * size
+    frames, _ = leg_kernel.room(legs.tables)
+    for j in range(len(legs)):
+        leg_kernel.chain(legs.tables, j, q, frames)
+        found = np.empty(3)
+        leg_kernel.drift(legs.tables, j, qd[0], frames, found)
+        assert np.abs(found - drift[j]).max() < 1e-7 * size
     assert not qd[:, ~robot.actuated].any() and not qdd[:, ~robot.actuated].any()
 
 
@@ -106,15 +121,18 @@ def test_solved_is_that_of_numpy_or_of_least_square():
     rng = np.random.default_rng(1)
     square, wanted = rng.normal(size=(100, 3, 3)), rng.normal(size=(100, 3))
     square[::10, :, 2] = square[::10, :, 0] + 2.0 * square[::10, :, 1]
-    x, regular = solved(square, wanted)
+    x, sides = np.empty((100, 3)), np.array([leg_kernel.side_of(one) for one in square])
+    for one, b, out in zip(square, wanted, x, strict=True):
+        leg_kernel.solve(one, b, out)
+    regular = sides != 0
     assert np.array_equal(np.flatnonzero(~regular), np.arange(0, 100, 10))
     assert np.abs(x[regular] - np.linalg.solve(square[regular], wanted[regular, :, None])[..., 0]).max() < 1e-10
     least = np.array(
         [np.linalg.lstsq(a, b, rcond=1e-9)[0] for a, b in zip(square[~regular], wanted[~regular], strict=True)]
     )
     assert np.abs(x[~regular] - least).max() < 1e-10
-    assert np.array_equal(bent(square)[regular], np.sign(np.linalg.det(square[regular])))
-    assert not bent(square)[~regular].any()
+    assert np.array_equal(sides[regular], np.sign(np.linalg.det(square[regular])))
+    assert np.array_equal(bent(square), sides)
 
 
 # --- SILO4, whose legs have a closed form ---

@@ -2,78 +2,151 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+import math
 
 import numpy as np
+from numba import njit
 
 from bodyplan.arrays import Array
 
-#: pairs of the six faces of a box: between two of them the depth along a segment is greatest, or at its ends
-_PAIRS = np.array(list(combinations(range(6), 2)))
+#: share of the size of coordinates by which a segment is outside of a box beyond what rounding may do
+CLEAR = 1e-12
 
 
 def segment_distance(p: Array, q: Array) -> Array:
     """Smallest distance (...,) between segments p and q (..., 2, 3), exact also where they cross or degenerate."""
-    d1, d2, r = p[..., 1, :] - p[..., 0, :], q[..., 1, :] - q[..., 0, :], p[..., 0, :] - q[..., 0, :]
-    a, e, b = (d1 * d1).sum(-1), (d2 * d2).sum(-1), (d1 * d2).sum(-1)
-    c, f = (d1 * r).sum(-1), (d2 * r).sum(-1)
-    # the closest pair of two segments is at their crossing (if any) or has an end point in it
-    det = a * e - b * b
-    crossing = det > 1e-14 * np.maximum(a * e, 1e-300)
-    safe = np.where(crossing, det, 1.0)
-    s, u = (b * f - c * e) / safe, (a * f - b * c) / safe
-    inside = crossing & (s >= 0) & (s <= 1) & (u >= 0) & (u <= 1)
-    gap = r + s[..., None] * d1 - u[..., None] * d2
-    best = np.where(inside, (gap * gap).sum(-1), np.inf)
-    for point, seg in ((p[..., 0, :], q), (p[..., 1, :], q), (q[..., 0, :], p), (q[..., 1, :], p)):
-        along = seg[..., 1, :] - seg[..., 0, :]
-        square = (along * along).sum(-1)
-        x = ((point - seg[..., 0, :]) * along).sum(-1) / np.where(square > 0, square, 1.0)
-        off = point - seg[..., 0, :] - np.clip(x, 0.0, 1.0)[..., None] * along
-        best = np.minimum(best, (off * off).sum(-1))
-    return np.asarray(np.sqrt(best))
+    first, second = np.broadcast_arrays(np.asarray(p, dtype=np.float64), np.asarray(q, dtype=np.float64))
+    out = np.empty(first.shape[:-2])
+    _distances(_flat(first, 2), _flat(second, 2), out.reshape(-1))
+    return out
 
 
 def segment_box_clearance(ends: Array, half: Array) -> Array:
     """Signed distance (...,) m of segments with ends (..., 2, 3), in the axes and from the centre of a box with
     ``half`` sizes (..., 3), from that box: outside to the nearest point of the segment, inside minus the depth of its
     deepest one."""
-    a, d = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
-    half = np.asarray(half, dtype=np.float64)
-    outside = _outside(a, d, half)
-    depth = _depth(a, d, half)
-    return np.asarray(np.where(depth >= 0.0, -depth, outside))
+    e, h = np.asarray(ends, dtype=np.float64), np.asarray(half, dtype=np.float64)
+    shape = np.broadcast_shapes(e.shape[:-2], h.shape[:-1])
+    out = np.empty(shape)
+    e, h = np.broadcast_to(e, (*shape, 2, 3)), np.broadcast_to(h, (*shape, 3))
+    _clearances(_flat(e, 2), _flat(h, 1), out.reshape(-1))
+    return out
 
 
-def _outside(a: Array, d: Array, half: Array) -> Array:
-    """Smallest distance (...,) of the points a + s d, 0 <= s <= 1, from the box. Its square is a parabola between the
-    places where the segment crosses a plane of a face, so that each piece is least at its own vertex, or an end."""
-    moves = np.abs(d) > 0.0
-    safe = np.where(moves, d, 1.0)
-    cuts = np.concatenate([np.where(moves, (sign * half - a) / safe, 0.0) for sign in (-1.0, 1.0)], axis=-1)
-    ends = np.broadcast_to([0.0, 1.0], (*cuts.shape[:-1], 2))
-    s = np.sort(np.concatenate([np.clip(cuts, 0.0, 1.0), ends], axis=-1), axis=-1)
-    first, last = s[..., :-1], s[..., 1:]
-    middle = a[..., None, :] + 0.5 * (first + last)[..., None] * d[..., None, :]
-    side = np.where(np.abs(middle) > half[..., None, :], np.sign(middle), 0.0)
-    over = (a[..., None, :] - side * half[..., None, :]) * np.abs(side)
-    way = d[..., None, :] * np.abs(side)
-    square = np.sum(way * way, axis=-1)
-    vertex = -np.sum(over * way, axis=-1) / np.where(square > 0.0, square, 1.0)
-    at = np.clip(vertex, first, last)
-    beyond = np.abs(a[..., None, :] + at[..., None] * d[..., None, :]) - half[..., None, :]
-    return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1).min(axis=-1))
+def _flat(array: Array, kept: int) -> Array:
+    return np.ascontiguousarray(array).reshape(-1, *array.shape[array.ndim - kept :])
 
 
-def _depth(a: Array, d: Array, half: Array) -> Array:
-    """Largest (...,) over 0 <= s <= 1 of the smallest distance of a + s d from the planes of the faces, negative where
-    it is outside of one: a concave function of straight pieces, greatest at an end or where two of them cross."""
-    start = np.concatenate([half - a, half + a], axis=-1)
-    slope = np.concatenate([-d, d], axis=-1)
-    i, j = _PAIRS.T
-    bend = slope[..., i] - slope[..., j]
-    safe = np.where(bend != 0.0, bend, 1.0)
-    cross = np.where(bend != 0.0, (start[..., j] - start[..., i]) / safe, 0.0)
-    ends = np.broadcast_to([0.0, 1.0], (*cross.shape[:-1], 2))
-    s = np.concatenate([np.clip(cross, 0.0, 1.0), ends], axis=-1)
-    return np.asarray((start[..., None, :] + s[..., None] * slope[..., None, :]).min(axis=-1).max(axis=-1))
+@njit(cache=True, nogil=True)
+def _distances(p: Array, q: Array, out: Array) -> None:
+    for k in range(len(out)):
+        out[k] = apart(p[k], q[k])
+
+
+@njit(cache=True, nogil=True)
+def _clearances(ends: Array, half: Array, out: Array) -> None:
+    for k in range(len(out)):
+        out[k] = from_box(ends[k], half[k])
+
+
+@njit(cache=True, nogil=True)
+def apart(p: Array, q: Array) -> float:
+    """Smallest distance between the segments ``p`` and ``q`` (2, 3)."""
+    a = e = b = c = f = 0.0
+    for i in range(3):
+        u, v, w = p[1, i] - p[0, i], q[1, i] - q[0, i], p[0, i] - q[0, i]
+        a, e, b, c, f = a + u * u, e + v * v, b + u * v, c + u * w, f + v * w
+    best = np.inf
+    # the closest pair of two segments is at their crossing (if any) or has an end point in it
+    det = a * e - b * b
+    if det > 1e-14 * max(a * e, 1e-300):
+        s, u = (b * f - c * e) / det, (a * f - b * c) / det
+        if 0.0 <= s <= 1.0 and 0.0 <= u <= 1.0:
+            best = 0.0
+            for i in range(3):
+                gap = p[0, i] - q[0, i] + s * (p[1, i] - p[0, i]) - u * (q[1, i] - q[0, i])
+                best += gap * gap
+    for k in range(2):
+        best = min(best, _from_point(p[k], q), _from_point(q[k], p))
+    return math.sqrt(best)
+
+
+@njit(cache=True, nogil=True)
+def _from_point(point: Array, segment: Array) -> float:
+    """Squared distance of a point (3,) from a segment (2, 3)."""
+    square = dot = 0.0
+    for i in range(3):
+        along = segment[1, i] - segment[0, i]
+        square += along * along
+        dot += (point[i] - segment[0, i]) * along
+    x = min(max(dot / square, 0.0), 1.0) if square > 0.0 else 0.0
+    out = 0.0
+    for i in range(3):
+        off = point[i] - segment[0, i] - x * (segment[1, i] - segment[0, i])
+        out += off * off
+    return out
+
+
+@njit(cache=True, nogil=True)
+def from_box(ends: Array, half: Array) -> float:
+    """Signed distance of one segment (2, 3) from a box with ``half`` sizes (3,) around the origin."""
+    out, size = _outside(ends, half), 0.0
+    for i in range(3):
+        size = max(size, half[i], abs(ends[0, i]), abs(ends[1, i]))
+    if out > CLEAR * size:
+        return out
+    depth = _depth(ends, half)
+    return -depth if depth >= 0.0 else out
+
+
+@njit(cache=True, nogil=True)
+def _outside(ends: Array, half: Array) -> float:
+    """Smallest distance of the points a + s d, 0 <= s <= 1, from the box. Its square is a parabola between the places
+    where the segment crosses a plane of a face, so that each piece is least at its own vertex, or an end."""
+    cuts = np.empty(8)
+    cuts[0], cuts[1], count = 0.0, 1.0, 2
+    for i in range(3):
+        a, d = ends[0, i], ends[1, i] - ends[0, i]
+        if d != 0.0:
+            for plane in (-half[i], half[i]):
+                s = (plane - a) / d
+                if 0.0 < s < 1.0:
+                    cuts[count] = s
+                    count += 1
+    pieces = np.sort(cuts[:count])
+    best = np.inf
+    for k in range(count - 1):
+        first, last = pieces[k], pieces[k + 1]
+        square = dot = 0.0
+        for i in range(3):
+            a, d = ends[0, i], ends[1, i] - ends[0, i]
+            middle = a + 0.5 * (first + last) * d
+            if abs(middle) > half[i]:
+                square += d * d
+                dot += (a - math.copysign(half[i], middle)) * d
+        s = min(max(-dot / square, first), last) if square > 0.0 else first
+        away = 0.0
+        for i in range(3):
+            beyond = abs(ends[0, i] + s * (ends[1, i] - ends[0, i])) - half[i]
+            away += max(beyond, 0.0) ** 2
+        best = min(best, away)
+    return math.sqrt(best)
+
+
+@njit(cache=True, nogil=True)
+def _depth(ends: Array, half: Array) -> float:
+    """Largest over 0 <= s <= 1 of the smallest distance of a + s d from the planes of the faces, negative where it is
+    outside of one: a concave function of straight pieces, greatest at an end or where two of them cross."""
+    start, slope = np.empty(6), np.empty(6)
+    for i in range(3):
+        a, d = ends[0, i], ends[1, i] - ends[0, i]
+        start[i], slope[i], start[3 + i], slope[3 + i] = half[i] - a, -d, half[i] + a, d
+    best = max(start.min(), (start + slope).min())
+    for i in range(6):
+        for j in range(i + 1, 6):
+            bend = slope[i] - slope[j]
+            if bend != 0.0:
+                s = (start[j] - start[i]) / bend
+                if 0.0 < s < 1.0:
+                    best = max(best, (start + s * slope).min())
+    return float(best)

@@ -11,7 +11,7 @@ import numpy as np
 from bodyplan.arrays import Array, finite, number
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.gaits.base import Gait, from_zero
-from bodyplan.gaits.crawl.legs import Legs
+from bodyplan.gaits.crawl.legs import Legs, legs_of
 from bodyplan.gaits.crawl.motion import motion_of, paces
 from bodyplan.gaits.crawl.planner import Plan, Planner
 from bodyplan.gaits.crawl.steps import Course
@@ -175,7 +175,7 @@ class Crawl(Gait):
         return self._planner(robot, ground, duty)
 
     def _planner(self, robot: Robot, ground: Ground, duty: float) -> Planner:
-        legs = Legs.of(robot)
+        legs = legs_of(robot)
         size = self._size(legs)
         height = HEIGHT * size if self.height is None else self.height
         reach = REACH * size if self.reach is None else self.reach

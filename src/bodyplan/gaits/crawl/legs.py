@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import InputError
+from bodyplan.gaits.crawl import leg_kernel
+from bodyplan.gaits.crawl.leg_kernel import SINGULAR, Postures, Tables
 from bodyplan.robot.elements import Joint, Row
+from bodyplan.robot.masses import mass_points
 from bodyplan.robot.model import Robot
 from bodyplan.spatial import rotate
 
-#: most steps of Newton, and after how many that do not halve the error it gives up; the error in m at which a foot is
-#: in place; the longest step of a joint (rad, or m)
-STEPS, PATIENCE, PLACED, STRIDE = 60, 15, 1e-13, 0.3
-#: smallest volume that the directions of a leg's joints span at which it can still be told its joints
-SINGULAR = 1e-6
 #: values a joint that are tried for a first guess
 GRID = 13
 
@@ -72,13 +70,6 @@ class Leg:
         _, places, feet, columns = self.jacobian(self.robot.forward(tried).array)
         return sets, feet, bent(self.square(columns)), places[..., 2].max(axis=1)
 
-    def nearest(self, targets: Array, among: IntArray) -> IntArray:
-        """(T,) which of the postures ``among`` has its foot nearest to ``targets`` (T, 3)."""
-        _, places, _, _ = self.postures
-        feet = places[among]
-        far = np.sum(feet * feet, axis=1) - 2.0 * targets @ feet.T  # squared, less what all have in common
-        return np.asarray(far.argmin(axis=1))
-
     def jacobian(self, poses: Array) -> tuple[Array, Array, Array, Array]:
         """(axes (T, k, 3), places (T, k, 3), foot (T, 3), columns (T, 3, k)) of the k drives at ``poses`` (T, F, 7)."""
         axes, places = [], []
@@ -100,32 +91,6 @@ class Leg:
             if len(j):
                 out[..., j[0]] += drive.scale * columns[..., k]
         return out
-
-    def drift(self, axis: Array, place: Array, foot: Array, rates: Array) -> Array:
-        """Acceleration (T, 3) of the foot where the drives change with ``rates`` (T, k) and nothing accelerates."""
-        spin, out = np.zeros_like(foot), np.zeros_like(foot)
-        speed = np.zeros_like(foot)  # of the foot
-        turns = [drive.turns for drive in self.drives]
-        for k, turning in enumerate(turns):
-            speed += rates[:, k, None] * (cross(axis[:, k], foot - place[:, k]) if turning else axis[:, k])
-        for k, turning in enumerate(turns):
-            axis_rate = cross(spin, axis[:, k])
-            if turning:
-                # the joint's own place, carried by the joints before it
-                carried = np.zeros_like(foot)
-                for j in range(k):
-                    part = cross(axis[:, j], place[:, k] - place[:, j]) if turns[j] else axis[:, j]
-                    carried += rates[:, j, None] * part
-                change = cross(axis_rate, foot - place[:, k]) + cross(axis[:, k], speed - carried)
-                spin = spin + rates[:, k, None] * axis[:, k]
-            else:
-                change = axis_rate
-            out += rates[:, k, None] * change
-        return out
-
-    def drive_rates(self, qd: Array) -> Array:
-        """(T, k) rates of the drives for joint rates ``qd`` (T, n)."""
-        return np.stack([drive.scale * qd[:, drive.column] for drive in self.drives], axis=1)
 
 
 def _longest(length: Any, robot: Robot) -> float:
@@ -149,6 +114,11 @@ class Legs:
     def names(self) -> tuple[str, ...]:
         """Names of the chains."""
         return tuple(leg.name for leg in self.legs)
+
+    @cached_property
+    def radii(self) -> Array:
+        """(m,) m: of the balls."""
+        return np.array([leg.radius for leg in self.legs])
 
     @classmethod
     def of(cls, robot: Robot) -> Legs:
@@ -217,62 +187,70 @@ class Legs:
         """Joint coordinates (T, n) that put the balls at ``targets`` (T, m, 3) in the base frame, from a ``guess``
         (n,); and which feet (T, m) came there, with legs that can still move in all directions and are bent to the
         same side as in the guess. What a sample gets does not depend on the others."""
-        q = np.repeat(guess[None], len(targets), axis=0)
-        placed = np.zeros(targets.shape[:2], dtype=bool)
-        for j, leg in enumerate(self.legs):
-            sets, _, sides, _ = leg.postures
-            side = self._side(leg, guess)
-            q[:, leg.columns], placed[:, j] = self._newton(leg, targets[:, j], q, side)
-            lost = np.flatnonzero(~placed[:, j])
-            mine = np.flatnonzero(sides == side)
-            if len(lost) and len(mine):
-                again = q[lost]
-                again[:, leg.columns] = sets[mine[leg.nearest(targets[lost, j], mine)]]
-                found, came = self._newton(leg, targets[lost, j], again, side)
-                q[np.ix_(lost[came], leg.columns)] = found[came]
-                placed[lost[came], j] = True
+        q, placed = np.empty((len(targets), self.robot.n)), np.empty(targets.shape[:2], dtype=bool)
+        leg_kernel.place(self.tables, self.postures, np.ascontiguousarray(targets), guess, q, placed)
         return q, placed
-
-    def _side(self, leg: Leg, q: Array) -> int:
-        _, _, _, columns = leg.jacobian(self.robot.forward(q[None]).array)
-        return int(bent(leg.square(columns))[0])
-
-    def _newton(self, leg: Leg, targets: Array, start: Array, side: int) -> tuple[Array, BoolArray]:
-        """The joints (T, 3) of one leg for its foot at ``targets`` (T, 3), from the coordinates ``start`` (T, n); and
-        whether they put it there, bent to ``side``."""
-        q, found = start.copy(), start[:, leg.columns]
-        best, sides = np.full(len(targets), np.inf), np.zeros(len(targets), dtype=np.int64)
-        scale = max(1.0, float(np.abs(targets).max(initial=0.0)))
-        rows, idle = np.arange(len(q)), np.zeros(len(q), dtype=np.int64)
-        for _ in range(STEPS):
-            _, _, foot, columns = leg.jacobian(self.robot.forward(q[rows]).array)
-            off, square = targets[rows] - foot, leg.square(columns)
-            size = np.linalg.norm(off, axis=1)
-            better = size < best[rows]
-            idle[rows] = np.where(size < 0.5 * best[rows], 0, idle[rows] + 1)
-            kept = rows[better]
-            found[kept], best[kept], sides[kept] = q[np.ix_(kept, leg.columns)], size[better], bent(square)[better]
-            rest = (best[rows] > PLACED * scale) & (idle[rows] < PATIENCE)
-            rows = rows[rest]
-            if not len(rows):
-                break
-            step, _ = solved(square[rest], off[rest])
-            longest = np.abs(step).max(axis=1, keepdims=True)
-            q[np.ix_(rows, leg.columns)] += step * np.minimum(1.0, STRIDE / np.maximum(longest, 1e-300))
-        return found, (best <= 100.0 * PLACED * scale) & (sides == side) & (sides != 0)
 
     def rates(self, q: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array]:
         """Exact joint rates and accelerations (T, n) for feet that move with ``velocity`` and ``acceleration``
         (T, m, 3) in the base frame."""
-        poses = self.robot.forward(q).array
         qd, qdd = np.zeros_like(q), np.zeros_like(q)
-        for j, leg in enumerate(self.legs):
-            axis, place, foot, columns = leg.jacobian(poses)
-            square = leg.square(columns)
-            qd[:, leg.columns], _ = solved(square, velocity[:, j])
-            drift = leg.drift(axis, place, foot, leg.drive_rates(qd))
-            qdd[:, leg.columns], _ = solved(square, acceleration[:, j] - drift)
+        at, speed, gain = (np.ascontiguousarray(v) for v in (q, velocity, acceleration))
+        leg_kernel.rates(self.tables, at, speed, gain, qd, qdd)
         return qd, qdd
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What kernels read."""
+        robot, legs = self.robot, self.legs
+        frames, masses, centres = mass_points(robot)
+        weight, middle = np.zeros(len(robot.frames)), np.zeros((len(robot.frames), 3))
+        weight[frames], middle[frames] = masses, centres
+        rows = [
+            (leg, chain, i) for leg, chain in zip(legs, robot.chains, strict=True) for i in range(len(chain.elements))
+        ]
+        joints, slots = np.full((len(rows), 4), -1), np.full((len(rows), 4), -1)
+        values, scales = np.zeros((len(rows), 4)), np.zeros((len(rows), 4))
+        for k, (leg, chain, i) in enumerate(rows):
+            for v, name in enumerate(Row.VARIABLES):
+                value = getattr(chain.elements[i], name)
+                if isinstance(value, Joint):
+                    joints[k, v], values[k, v], scales[k, v] = robot.joint_index(value.name), value.offset, value.scale
+                    mine = np.flatnonzero(leg.columns == joints[k, v])
+                    slots[k, v] = mine[0] if len(mine) else -1
+                else:
+                    values[k, v] = float(value)
+        after = np.array([leg.frames[i + 1] for leg, _, i in rows], dtype=np.int64)
+        return Tables(
+            _starts([len(leg.frames) - 1 for leg in legs]),
+            joints.astype(np.int64),
+            slots.astype(np.int64),
+            values,
+            scales,
+            weight[after],
+            middle[after],
+            np.stack([leg.columns for leg in legs]),
+            np.stack([leg.local for leg in legs]),
+            np.array([weight[0], *middle[0]]),
+        )
+
+    @cached_property
+    def postures(self) -> Postures:
+        """Those of all legs, for kernels."""
+        parts = [leg.postures for leg in self.legs]
+        starts = _starts([len(part[0]) for part in parts])
+        sets, feet, sides = (np.concatenate([part[k] for part in parts]) for k in range(3))
+        return Postures(starts, sets, feet, sides)
+
+
+def _starts(counts: list[int]) -> IntArray:
+    return np.array([0, *np.cumsum(counts)], dtype=np.int64)
+
+
+@lru_cache(maxsize=16)
+def legs_of(robot: Robot) -> Legs:
+    """:meth:`Legs.of`, remembered."""
+    return Legs.of(robot)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -290,20 +268,6 @@ def direction(quaternion: Array, upright: bool) -> Array:
     else:
         parts = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
     return np.stack(parts, axis=1)
-
-
-def solved(square: Array, wanted: Array) -> tuple[Array, BoolArray]:
-    """(x (T, 3), regular (T,)) of ``square`` (T, 3, 3) x = ``wanted`` (T, 3): by Cramer's rule, or the least x of least
-    error where the columns are all but in a plane and ``regular`` is False."""
-    one, two, three = (square[..., k] for k in range(3))
-    normals = np.stack([cross(two, three), cross(three, one), cross(one, two)], axis=1)
-    volume = np.sum(one * normals[:, 0], axis=1)
-    regular = bent(square) != 0
-    x = np.einsum("tij,tj->ti", normals, wanted) / np.where(regular, volume, 1.0)[:, None]
-    flat = np.flatnonzero(~regular)
-    if len(flat):
-        x[flat] = np.einsum("tij,tj->ti", np.linalg.pinv(square[flat], rcond=SINGULAR), wanted[flat])
-    return x, np.asarray(regular)
 
 
 def bent(square: Array) -> IntArray:

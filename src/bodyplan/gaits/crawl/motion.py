@@ -206,7 +206,7 @@ def _apart(planner: Planner) -> list[Claim]:
     if planner.shell is None:
         return []
     out = []
-    ends_in_foot = planner.needed < planner.shell.keep
+    ends_in_foot = planner.needed < planner.clearance
     for label, which in (("links and body clear of the ground", ~ends_in_foot), ("shins off the ground", ends_in_foot)):
         parts = [int(part) for part in np.flatnonzero(which)]
         if parts:

@@ -12,33 +12,32 @@ from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status
 from bodyplan.gaits.crawl.footholds import footholds
 from bodyplan.gaits.crawl.legs import Legs, stance_guess
-from bodyplan.gaits.crawl.shell import Shell
+from bodyplan.gaits.crawl.shell import Shell, shell_of
 from bodyplan.gaits.crawl.steps import Course, Step, blend, clear_swing, clear_swings, swing_path
+from bodyplan.gaits.crawl.sway_kernel import sways
 from bodyplan.ground.base import Ground
-from bodyplan.robot.masses import center_of_mass
-from bodyplan.spatial import quaternion_exp, rotate
-from bodyplan.spatial.hulls import edge_distances
-from bodyplan.spatial.rotations import conjugate, multiply
+from bodyplan.spatial.rotations import conjugate, matrix_from_quaternion
 
 if TYPE_CHECKING:
     from bodyplan.gaits.crawl.gait import Crawl
 
 #: shares of the way to the centroid of the support that are tried as sway
-SHARES = 41
+SHARES = np.linspace(0.0, 1.0, 41)
 #: places of a swing at which the support is tried
 PLACES = np.linspace(0.0, 1.0, 9)
 #: weight of sway against the logarithms of the distances from the edges
 SWAY_COST = 0.5
 #: where a step is looked at for what links and body could touch: of the body's move, and of the swing
 MOVE, SWING = np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 33)
+_MOVED = blend(MOVE)[0]
 #: what is tried where they come too near: so many footholds and swings, the body higher by such shares
 SPOTS, SWINGS, RISES = 25, 12, (0.0, 0.06, 0.12, 0.2)
 #: a share of sway with which steps to come are guessed
 AHEAD = 0.4
 #: most steps of one plan: a mistyped time should not eat the machine
 MOST_STEPS = 20_000
-#: m of distances that rounding may change
-EXACT = 1e-9
+#: m of distances that rounding may change, and by which it makes a difference of none
+EXACT, TIE = 1e-9, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +96,8 @@ class Planner:
         stance = self.offsets - [0.0, 0.0, self.height]
         q, _ = self.legs.place(stance[None], stance_guess(self.legs, stance))
         self.guess = q[0]
-        self.shell = Shell.of(self.legs, self.clearance)
-        self.needed = np.zeros(0) if self.shell is None else self.shell.needed(self.guess)
+        self.shell = shell_of(self.legs)
+        self.needed = np.zeros(0) if self.shell is None else self.shell.needed(self.guess, self.clearance)
 
     @property
     def step_time(self) -> float:
@@ -214,10 +213,12 @@ class Planner:
         if shell is None:
             return None, False
         leg, name = step.leg, self.legs.names[step.leg]
-        value, _, _ = blend(MOVE)
-        later = [self._later(step, n, k, share) for k in range(1, len(self.legs)) for share in (0.0, step.share, AHEAD)]
         poses = np.concatenate(
-            [before + value[:, None] * (step.pose - before), np.tile(step.pose, (len(SWING), 1)), later]
+            [
+                before + _MOVED[:, None] * (step.pose - before),
+                np.broadcast_to(step.pose, (len(SWING), 6)),
+                self._later(step, n),
+            ]
         )
         feet = np.repeat(step.before[None], len(poses), axis=0)
         feet[len(MOVE) : len(MOVE) + len(SWING), leg] = step.foot(SWING)[0]
@@ -230,7 +231,9 @@ class Planner:
         first, last = len(MOVE), len(MOVE) + len(SWING)
         mine = shell.owners == leg
         when = f"while {name} swings at {step.lift_off:.4g} s"
-        row, part = np.unravel_index(int(spare[:last].argmin()), (last, spare.shape[1]))
+        # the first of those that only rounding tells apart
+        worst = spare[:last] <= spare[:last].min() + TIE
+        row, part = np.unravel_index(int(worst.argmax()), worst.shape)
         short = -float(spare[row, part])
         if short > EXACT:
             if row < first:
@@ -250,12 +253,16 @@ class Planner:
             return _Failure(Status.BELOW_FLOOR, "", step.begin, short, True, step), False
         return None, False
 
-    def _later(self, step: Step, n: int, k: int, share: float) -> Array:
-        """A guess of the body's pose (6,) ``k`` steps after step ``n``, with a ``share`` of sway."""
-        at, heading = self.course.at((n + k) * self.step_time)
-        swinging = self.order[(n + k) % len(self.legs)]
-        centroid = np.delete(step.after, swinging, axis=0)[:, :2].mean(axis=0)
-        return self.pose(at + share * (centroid - at), heading, step.after)
+    def _later(self, step: Step, n: int) -> Array:
+        """Guesses (k, 6) of the body's poses in the steps after step ``n`` until its leg swings again, with more and
+        less sway."""
+        ways, plane = [], self.plane(step.after)
+        for k in range(1, len(self.legs)):
+            at, heading = self.course.at((n + k) * self.step_time)
+            swinging = self.order[(n + k) % len(self.legs)]
+            centroid = _others(step.after, swinging)[:, :2].mean(axis=0)
+            ways += [(*(at + share * (centroid - at)), heading) for share in (0.0, step.share, AHEAD)]
+        return self.over(plane, np.array(ways))
 
     def _footholds(self, leg: int, n: float) -> tuple[Array, str]:
         """Centres (k, 3) m, best first, of a foot that swings in step ``n``: below where the body will be in the middle
@@ -278,32 +285,24 @@ class Planner:
         """Pose (6,) of the body, ``rise`` m higher than usual, while ``leg`` swings in step ``n``, the least margin m,
         the share of the sway and which feet (m,) are in reach."""
         at, heading = self.course.at(n * self.step_time)
-        others = [j for j in range(len(self.legs)) if j != leg]
-        stance = before[others]
-        centroid = stance[:, :2].mean(axis=0)
-        shares = np.linspace(0.0, 1.0, SHARES) if self.gait.sway == "auto" else np.array([float(self.gait.sway)])
-        poses = np.stack([self.pose(at + s * (centroid - at), heading, before) for s in shares])
+        centroid = _others(before, leg)[:, :2].mean(axis=0)
+        auto, legs, robot = self.gait.sway == "auto", self.legs, self.legs.robot
+        shares = SHARES if auto else np.array([float(self.gait.sway)])
+        ways = np.empty((len(shares), 3))
+        ways[:, :2], ways[:, 2] = at + shares[:, None] * (centroid - at), heading
+        poses = self.over(self.plane(before), ways)
         poses[:, 2] += rise
         swung, _, _ = swing_path(before[leg], after[leg], *shape, PLACES)
-        feet = np.repeat(before[None], len(PLACES), axis=0)
-        feet[:, leg] = swung
-        every = np.repeat(poses, len(PLACES), axis=0)
-        targets = np.tile(feet, (len(shares), 1, 1))
-        base = base_of(every)
-        q, placed = self.legs.place(seen_from(base, targets), self.guess)
-        reached: BoolArray = np.all(placed.reshape(len(shares), len(PLACES), -1), axis=1)
-        good: BoolArray = np.all(reached, axis=1)
-        center = (center_of_mass(self.legs.robot, q, base) if self.legs.robot.mass > 0.0 else base)[:, :2]
-        distances = edge_distances(np.repeat(stance[None, :, :2], len(center), axis=0), center)
-        least = distances.min(axis=1).reshape(len(shares), -1).min(axis=1)
-        logs = np.log(
-            np.maximum(distances, 1e-6) / self.height, where=np.isfinite(distances), out=np.zeros_like(distances)
-        )
-        barrier = logs.sum(axis=1).reshape(len(shares), -1).min(axis=1) - SWAY_COST * shares**2
-        limits = self.legs.robot.limits
-        inside = np.all((q >= limits[:, 0] - EXACT) & (q <= limits[:, 1] + EXACT), axis=1)
-        within: BoolArray = np.all(inside.reshape(len(shares), -1), axis=1)
-        k = self._chosen(least, barrier, good, within)
+        least, barrier = np.full(len(shares), np.inf), np.full(len(shares), np.inf)
+        reached, within = np.ones((len(shares), len(legs)), dtype=bool), np.ones(len(shares), dtype=bool)
+        # the least sway that will do is known as soon as it is met
+        enough = self.margin - EXACT if auto and self.gait.stability == "margin" else np.inf
+        limits = robot.limits + np.array([-EXACT, EXACT])
+        k = sways(legs.tables, legs.postures, self.guess, limits, poses, before, leg, swung, enough, self.height,
+                  least, barrier, reached, within)  # fmt: skip
+        if k < 0:
+            good: BoolArray = np.all(reached, axis=1)
+            k = self._chosen(least, barrier - SWAY_COST * shares**2, good, within)
         return poses[k], float(least[k]), float(shares[k]), reached[k]
 
     def _chosen(self, least: Array, barrier: Array, good: BoolArray, within: BoolArray) -> int:
@@ -319,33 +318,50 @@ class Planner:
                 return int(mine.argmax() if first else np.where(mine, wanted, -np.inf).argmax())
         return int(np.where(good, least, -np.inf).argmax())
 
-    def pose(self, at: Array, heading: float, feet: Array) -> Array:
-        """(6,) x, y, z, roll, pitch, yaw over the plane through all feet, level or along it."""
-        radii = np.array([leg.radius for leg in self.legs.legs])
-        ground = feet - radii[:, None] * [0.0, 0.0, 1.0]
+    def plane(self, feet: Array) -> Array:
+        """(3,) slopes along x and y, and height m at the origin, of the plane through the ground below all ``feet``
+        (m, 3), at best."""
+        ground = feet - self.legs.radii[:, None] * [0.0, 0.0, 1.0]
         design = np.concatenate([ground[:, :2], np.ones((len(ground), 1))], axis=1)
-        (gx, gy, g0), *_ = np.linalg.lstsq(design, ground[:, 2], rcond=None)
-        z = gx * at[0] + gy * at[1] + g0 + self.height + float(radii.mean())
-        roll = pitch = 0.0
+        return np.asarray(np.linalg.lstsq(design, ground[:, 2], rcond=None)[0])
+
+    def over(self, plane: Array, ways: Array) -> Array:
+        """(k, 6) x, y, z, roll, pitch, yaw at x, y, yaw (k, 3) over a :meth:`plane`, level or along it."""
+        gx, gy, g0 = plane
+        x, y, heading = ways.T
+        out = np.zeros((len(ways), 6))
+        out[:, 0], out[:, 1], out[:, 5] = x, y, heading
+        out[:, 2] = gx * x + gy * y + g0 + self.height + float(self.legs.radii.mean())
         if self.gait.body == "follow":
             c, s = np.cos(heading), np.sin(heading)
             ahead, left = gx * c + gy * s, -gx * s + gy * c
-            pitch = -np.arctan(ahead)
-            roll = np.arctan(left * np.cos(pitch))
-        return np.array([at[0], at[1], z, roll, pitch, heading])
+            out[:, 4] = -np.arctan(ahead)
+            out[:, 3] = np.arctan(left * np.cos(out[:, 4]))
+        return out
+
+    def pose(self, at: Array, heading: float, feet: Array) -> Array:
+        """(6,) x, y, z, roll, pitch, yaw over the plane through all feet, level or along it."""
+        return np.asarray(self.over(self.plane(feet), np.array([[at[0], at[1], heading]]))[0])
+
+
+def _others(feet: Array, leg: int) -> Array:
+    """(m - 1, 3): all feet but one."""
+    return np.concatenate([feet[:leg], feet[leg + 1 :]])
 
 
 def base_of(poses: Array) -> Array:
     """Base poses (T, 7) from x, y, z, roll, pitch, yaw (T, 6): R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    x, y, z = np.eye(3)
-    turn = multiply(
-        multiply(quaternion_exp(poses[:, 5:6] * z), quaternion_exp(poses[:, 4:5] * y)),
-        quaternion_exp(poses[:, 3:4] * x),
-    )
-    return np.concatenate([poses[:, :3], turn], axis=1)
+    out = np.empty((len(poses), 7))
+    out[:, :3] = poses[:, :3]
+    (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * poses[:, 3:].T), np.sin(0.5 * poses[:, 3:].T)
+    out[:, 3] = cy * cp * cr + sy * sp * sr
+    out[:, 4] = cy * cp * sr - sy * sp * cr
+    out[:, 5] = cy * sp * cr + sy * cp * sr
+    out[:, 6] = sy * cp * cr - cy * sp * sr
+    return out
 
 
 def seen_from(base: Array, points: Array) -> Array:
     """World points (T, m, 3) in the frames of ``base`` (T, 7)."""
-    back = conjugate(base[:, None, 3:])
-    return np.asarray(rotate(back, points - base[:, None, :3]))
+    back = matrix_from_quaternion(conjugate(base[:, 3:]))
+    return np.asarray(np.einsum("tij,tmj->tmi", back, points - base[:, None, :3]))

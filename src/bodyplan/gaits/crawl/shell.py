@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import InputError
 from bodyplan.gaits.crawl.legs import Legs
+from bodyplan.gaits.crawl.shell_kernel import nearest_slim, nearest_to_box, placed
 from bodyplan.ground.base import Ground
 from bodyplan.ground.field import Field
 from bodyplan.ground.near import clearance_up_to, segment_clearance_up_to
 from bodyplan.ground.plane import Plane
 from bodyplan.robot.elements import Contact
 from bodyplan.robot.neighbours import separate_contacts
-from bodyplan.spatial import conjugate, rotate
-from bodyplan.spatial.segments import segment_box_clearance, segment_distance
 
 #: share of its distance from level ground that a part must keep at most
 USUAL = 0.75
@@ -30,21 +29,20 @@ EXACT = 1e-9
 @dataclass(frozen=True, eq=False)
 class Shell:
     """The shapes of a robot that are no feet. ``slim``, ``boxes``: indices among its contacts of capsules and spheres,
-    and of boxes; ``keep`` m: how far they are to stay off the ground."""
+    and of boxes."""
 
     legs: Legs
     slim: tuple[int, ...]
     boxes: tuple[int, ...]
-    keep: float
 
     @classmethod
-    def of(cls, legs: Legs, keep: float) -> Shell | None:
+    def of(cls, legs: Legs) -> Shell | None:
         """The shell of a robot; None for one that has feet alone."""
         feet = {leg.contact for leg in legs.legs}
         others = [(k, c.shape) for k, c in enumerate(legs.robot.contacts) if k not in feet]
         slim = tuple(k for k, shape in others if shape in ("capsule", "sphere"))
         boxes = tuple(k for k, shape in others if shape == "box")
-        return cls(legs, slim, boxes, keep) if slim or boxes else None
+        return cls(legs, slim, boxes) if slim or boxes else None
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -64,22 +62,23 @@ class Shell:
         """Name of a part's contact."""
         return self.legs.robot.contacts[self.parts[part]].name
 
-    def needed(self, stance: Array) -> Array:
-        """(k,) m that every part is to stay off the ground: ``keep``, or USUAL of what it has where the robot stands on
-        level ground with joints ``stance`` (n,), if that is less: a shin that ends in its foot cannot keep off."""
+    def needed(self, stance: Array, keep: float) -> Array:
+        """(k,) m that every part is to stay off the ground: ``keep`` m, or USUAL of what it has where the robot stands
+        on level ground with joints ``stance`` (n,), if that is less: a shin that ends in its foot cannot keep off."""
         feet = self.legs.feet(stance[None])[0]
         radii = np.array([leg.radius for leg in self.legs.legs])
         level = Plane(float((feet[:, 2] - radii).min()))
         usual = self.gaps(level, self.legs.robot.forward(stance[None]).array, np.full(len(self.parts), np.inf))[0]
-        return np.asarray(np.minimum(self.keep, np.maximum(USUAL * usual - EXACT, 0.0)))
+        return np.asarray(np.minimum(keep, np.maximum(USUAL * usual - EXACT, 0.0)))
 
     def gaps(self, ground: Ground, poses: Array, most: Array) -> Array:
         """Gaps (S, k) m of all parts to the ground at poses (S, F, 7) of all frames, up to ``most`` (k,) m; minus
         infinity beyond the edge of the ground."""
         out = np.full((len(poses), len(self.parts)), -np.inf)
         if self.slim:
-            radii = np.array([self._contact(k).radius for k in self.slim])
-            ends = np.stack([self._placed(k, poses, _skeleton(self._contact(k))) for k in self.slim], axis=1)
+            _, radii = self._skeletons
+            radii = radii[list(self.slim)]
+            ends = self._ends(poses, self.slim)
             for rows in _on(ground, ends):
                 out[rows, : len(radii)] = (
                     segment_clearance_up_to(ground, ends[rows], most[: len(radii)] + radii + EXACT) - radii
@@ -93,51 +92,64 @@ class Shell:
     def nearest_pair(self, poses: Array) -> tuple[float, int, tuple[str, str]]:
         """The smallest gap m between two shapes of the robot that are no neighbours, feet included, at which of the
         poses (S, F, 7), and their names; infinite for a robot without such."""
-        best, when, names = np.inf, 0, ("", "")
         slim, boxed = self._pairs
-        if len(slim):
-            used = np.unique(slim)
-            ends = {k: self._placed(k, poses, _skeleton(self._contact(k))) for k in used.tolist()}
-            radii = np.array([self._contact(a).radius + self._contact(b).radius for a, b in slim])
-            first, second = (np.stack([ends[k] for k in column]) for column in slim.T.tolist())
-            gaps = segment_distance(first, second) - radii[:, None]
-            pair, sample = np.unravel_index(gaps.argmin(), gaps.shape)
-            best, when = float(gaps[pair, sample]), int(sample)
-            names = self._contact(int(slim[pair, 0])).name, self._contact(int(slim[pair, 1])).name
-        for a, b in boxed:
-            gap = self._to_box(a, b, poses)
-            if gap.min() < best:
-                best, when = float(gap.min()), int(gap.argmin())
-                names = self._contact(a).name, self._contact(b).name
-        return best, when, names
+        every = tuple(range(len(self.legs.robot.contacts)))
+        ends, (_, radii) = self._ends(poses, every), self._skeletons
+        best, pair, when = nearest_slim(ends, radii, slim)
+        names = (self._contact(slim[pair, 0]).name, self._contact(slim[pair, 1]).name) if best < np.inf else ("", "")
+        for box, others in boxed:
+            shape = self._contact(box)
+            at = np.ascontiguousarray(poses[:, self.legs.robot.frame_index(shape.frame)])
+            gap, other, sample = nearest_to_box(at, np.array(shape.start), np.array(shape.half), ends, radii, others)
+            if gap < best:
+                best, when, names = gap, sample, (shape.name, self._contact(others[other]).name)
+        return float(best), int(when), names
 
     @cached_property
-    def _pairs(self) -> tuple[IntArray, list[tuple[int, int]]]:
-        """Pairs (n, 2) of capsules and spheres that are no neighbours, and (box, other) pairs."""
-        slim, boxed = [], []
+    def _pairs(self) -> tuple[IntArray, list[tuple[int, IntArray]]]:
+        """Pairs (n, 2) of capsules and spheres that are no neighbours, and boxes with the others (k,) that are none of
+        theirs."""
+        slim: list[tuple[int, int]] = []
+        boxed: dict[int, list[int]] = {}
         for a, b in separate_contacts(self.legs.robot):
             shapes = self._contact(a).shape, self._contact(b).shape
             if "rim" in shapes or shapes == ("box", "box"):
                 continue
             if "box" in shapes:
-                boxed.append((a, b) if shapes[0] == "box" else (b, a))
+                box, other = (a, b) if shapes[0] == "box" else (b, a)
+                boxed.setdefault(box, []).append(other)
             else:
                 slim.append((a, b))
-        return np.array(slim, dtype=np.int64).reshape(-1, 2), boxed
+        others = [(box, np.array(rest, dtype=np.int64)) for box, rest in boxed.items()]
+        return np.array(slim, dtype=np.int64).reshape(-1, 2), others
+
+    @cached_property
+    def _skeletons(self) -> tuple[Array, Array]:
+        """Of all contacts: the ends (c, 2, 3) m of their middle lines in their frames, and the radii (c,) m."""
+        contacts = self.legs.robot.contacts
+        ends = [(c.start, c.end if c.shape == "capsule" else c.start) for c in contacts]
+        return np.array(ends).reshape(-1, 2, 3), np.array([c.radius for c in contacts])
+
+    def _ends(self, poses: Array, which: tuple[int, ...]) -> Array:
+        """World ends (S, k, 2, 3) m of the middle lines of contacts."""
+        local, _ = self._skeletons
+        return self._placed(poses, which, local[list(which)])
 
     def _contact(self, k: int) -> Contact:
         return self.legs.robot.contacts[k]
 
-    def _placed(self, k: int, poses: Array, local: Array) -> Array:
-        """World points (S, p, 3) of points (p, 3) of a contact's frame."""
-        at = poses[:, self.legs.robot.frame_index(self._contact(k).frame)]
-        return np.asarray(at[:, None, :3] + rotate(at[:, None, 3:], local))
+    def _placed(self, poses: Array, which: tuple[int, ...], local: Array) -> Array:
+        """World points (S, k, p, 3) of points (k, p, 3) in the frames of contacts."""
+        frames = np.array([self.legs.robot.frame_index(self._contact(k).frame) for k in which], dtype=np.int64)
+        out = np.empty((len(poses), *local.shape))
+        placed(poses, frames, local, out)
+        return out
 
     def _box_gaps(self, ground: Ground, k: int, poses: Array, most: float) -> Array:
         box = self._contact(k)
         curved = isinstance(ground, Field)
         local = _faces(box) if curved else box.points()[_edges(box)].reshape(-1, 3)
-        places, out = self._placed(k, poses, local), np.full(len(poses), -np.inf)
+        places, out = self._placed(poses, (k,), local[None])[:, 0], np.full(len(poses), -np.inf)
         for rows in _on(ground, places):
             if curved:
                 out[rows] = clearance_up_to(ground, places[rows], most + EXACT).min(axis=1)
@@ -145,16 +157,11 @@ class Shell:
                 out[rows] = segment_clearance_up_to(ground, places[rows].reshape(len(rows), -1, 2, 3), most).min(axis=1)
         return out
 
-    def _to_box(self, box: int, slim: int, poses: Array) -> Array:
-        shape, other = self._contact(box), self._contact(slim)
-        at = poses[:, self.legs.robot.frame_index(shape.frame)]
-        ends = self._placed(slim, poses, _skeleton(other))
-        local = rotate(conjugate(at[:, None, 3:]), ends - at[:, None, :3]) - np.array(shape.start)
-        return segment_box_clearance(local, np.array(shape.half)) - other.radius
 
-
-def _skeleton(contact: Contact) -> Array:
-    return np.array([contact.start, contact.end if contact.shape == "capsule" else contact.start])
+@lru_cache(maxsize=16)
+def shell_of(legs: Legs) -> Shell | None:
+    """:meth:`Shell.of`, remembered."""
+    return Shell.of(legs)
 
 
 def _edges(box: Contact) -> IntArray:
