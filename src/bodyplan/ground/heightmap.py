@@ -168,6 +168,11 @@ class HeightMap(Field):
         return self._origin
 
     @property
+    def spline(self) -> BicubicSpline:
+        """The spline through the samples, in coordinates from the first one."""
+        return self._spline
+
+    @property
     def field_box(self) -> Array:
         return self._box
 

@@ -105,6 +105,11 @@ class BicubicSpline:
         corners = self.nodes[(j[:, None] + [0, 1])[:, :, None], (i[:, None] + [0, 1])[:, None, :]]
         return np.asarray(np.swapaxes(corners, 2, 3).reshape(-1, 4, 4))
 
+    @property
+    def pyramid(self) -> tuple[IntArray, IntArray, Array]:
+        """Bounds of blocks of cells, for kernels: see :func:`bodyplan.ground.spline_kernel.spline_bounds`."""
+        return self._pyramid
+
     @cached_property
     def _pyramid(self) -> tuple[IntArray, IntArray, Array]:
         """The tables of the cells, then of blocks of 2 x 2, 4 x 4, ... cells, by minima.

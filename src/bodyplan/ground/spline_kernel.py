@@ -1,53 +1,94 @@
-"""The kernel of the bicubic spline: value, gradient and Hessian at many places."""
+"""The kernels of the bicubic spline: value, gradient and Hessian at places, bounds over boxes."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, IntArray
 
 
 @njit(cache=True, nogil=True)
 def spline_jet(nodes: Array, dx: float, dy: float, x: Array, y: Array, f: Array, g: Array, h: Array) -> None:
     """Fill ``f`` (n,), ``g`` (n, 2), ``h`` (n, 2, 2) at ``x``, ``y`` (n,) for the Hermite data ``nodes``
     (ny, nx, 2, 2); edge cells continue outwards; nan where a place is not finite."""
-    ny, nx = nodes.shape[0], nodes.shape[1]
-    wx, wy = np.empty((3, 4)), np.empty((3, 4))
+    basis, out = np.empty((2, 3, 4)), np.empty(6)
     for k in range(len(x)):
-        u, v = x[k] / dx, y[k] / dy
-        if not (np.isfinite(u) and np.isfinite(v)):
-            f[k] = np.nan
-            g[k, :] = np.nan
-            h[k, :, :] = np.nan
-            continue
-        # compare before converting: a place far outside has no integer
-        i = int(min(max(np.floor(u), 0.0), nx - 2.0))
-        j = int(min(max(np.floor(v), 0.0), ny - 2.0))
-        _basis(u - i, wx)
-        _basis(v - j, wy)
-        value = along = across = xx = xy = yy = 0.0
-        for b in range(2):
-            for q in range(2):
-                row = 2 * b + q
-                d0 = d1 = d2 = 0.0
-                for a in range(2):
-                    for p in range(2):
-                        node = nodes[j + b, i + a, q, p]
-                        column = 2 * a + p
-                        d0 += node * wx[0, column]
-                        d1 += node * wx[1, column]
-                        d2 += node * wx[2, column]
-                value += wy[0, row] * d0
-                along += wy[0, row] * d1
-                xx += wy[0, row] * d2
-                across += wy[1, row] * d0
-                xy += wy[1, row] * d1
-                yy += wy[2, row] * d0
-        f[k] = value
-        g[k, 0], g[k, 1] = along / dx, across / dy
-        h[k, 0, 0], h[k, 1, 1] = xx / dx**2, yy / dy**2
-        h[k, 0, 1] = h[k, 1, 0] = xy / (dx * dy)
+        spline_at(nodes, dx, dy, x[k], y[k], basis, out)
+        f[k], g[k, 0], g[k, 1] = out[0], out[1], out[2]
+        h[k, 0, 0], h[k, 1, 1] = out[3], out[5]
+        h[k, 0, 1] = h[k, 1, 0] = out[4]
+
+
+@njit(cache=True, nogil=True)
+def spline_at(nodes: Array, dx: float, dy: float, x: float, y: float, basis: Array, out: Array) -> None:
+    """Value, slopes along x and y, second derivatives xx, xy, yy at one place into ``out`` (6+,), nan where it is not
+    finite; ``basis`` (2, 3, 4) is room to work in."""
+    ny, nx = nodes.shape[0], nodes.shape[1]
+    u, v = x / dx, y / dy
+    if not (np.isfinite(u) and np.isfinite(v)):
+        out[:6] = np.nan
+        return
+    # compare before converting: a place far outside has no integer
+    i = int(min(max(np.floor(u), 0.0), nx - 2.0))
+    j = int(min(max(np.floor(v), 0.0), ny - 2.0))
+    wx, wy = basis[0], basis[1]
+    _basis(u - i, wx)
+    _basis(v - j, wy)
+    value = along = across = xx = xy = yy = 0.0
+    for b in range(2):
+        for q in range(2):
+            row = 2 * b + q
+            d0 = d1 = d2 = 0.0
+            for a in range(2):
+                for p in range(2):
+                    node = nodes[j + b, i + a, q, p]
+                    column = 2 * a + p
+                    d0 += node * wx[0, column]
+                    d1 += node * wx[1, column]
+                    d2 += node * wx[2, column]
+            value += wy[0, row] * d0
+            along += wy[0, row] * d1
+            xx += wy[0, row] * d2
+            across += wy[1, row] * d0
+            xy += wy[1, row] * d1
+            yy += wy[2, row] * d0
+    out[0], out[1], out[2] = value, along / dx, across / dy
+    out[3], out[4], out[5] = xx / dx**2, xy / (dx * dy), yy / dy**2
+
+
+@njit(cache=True, nogil=True)
+def spline_bounds(
+    shape: tuple[int, int],
+    dx: float,
+    dy: float,
+    offsets: IntArray,
+    widths: IntArray,
+    tables: Array,
+    low_x: float,
+    low_y: float,
+    high_x: float,
+    high_y: float,
+    out: Array,
+) -> None:
+    """Of one box, as :meth:`bodyplan.ground.spline.BicubicSpline.bounds`: lowest and highest value, second derivatives
+    xx, xy, yy, and a bound of the third ones, into ``out`` (9,). ``shape``: how many nodes there are in y and x."""
+    last_x, last_y = shape[1] - 2.0, shape[0] - 2.0
+    ax = int(min(max(np.floor(low_x / dx - 1e-9), 0.0), last_x))
+    ay = int(min(max(np.floor(low_y / dy - 1e-9), 0.0), last_y))
+    bx = int(min(max(np.floor(high_x / dx + 1e-9), 0.0), last_x))
+    by = int(min(max(np.floor(high_y / dy + 1e-9), 0.0), last_y))
+    # the level on which the box meets at most two blocks along each axis
+    span, level = max(bx - ax, by - ay), 0
+    while (1 << level) < span:
+        level += 1
+    ax, ay, bx, by = ax >> level, ay >> level, bx >> level, by >> level
+    start, width = offsets[level], widths[level]
+    one, two = start + ay * width + ax, start + ay * width + bx
+    three, four = start + by * width + ax, start + by * width + bx
+    for k in range(9):
+        lowest = min(min(tables[k, one], tables[k, two]), min(tables[k, three], tables[k, four]))
+        out[k] = lowest if k % 2 == 0 and k < 8 else -lowest
 
 
 @njit(cache=True, nogil=True)

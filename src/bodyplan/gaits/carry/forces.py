@@ -118,7 +118,7 @@ def forces(pose: Pose, mu: Any = None, objective: str = "min_norm", *, interval:
     if len(rows):
         solved = contact_forces(*given, friction, objective)
         held[rows], status[rows] = solved.forces, solved.status
-        required[rows] = required_friction(*given).mu
+        required[rows] = required_friction(*given, forces=False).mu
         if interval:
             low[rows], high[rows] = torque_interval(*given, friction, some.levers)
     adjust, hub = stance.adjust(held), stance.hub(held)

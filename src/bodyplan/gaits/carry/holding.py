@@ -15,6 +15,7 @@ from bodyplan.gaits.carry.carriage import Carriage
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim
+from bodyplan.solve.statics.friction import LeastFriction
 
 if TYPE_CHECKING:
     from bodyplan.gaits.carry.motion import Rolled
@@ -22,9 +23,8 @@ if TYPE_CHECKING:
 
 #: share of the weight, of a torque, and friction that the judge, who finds contacts by sampling rims, may be off by
 BALANCE = 1e-5
-#: samples at which the least friction is looked for, a cone program each: evenly chosen, where most friction is used,
-#: and in rounds nearer and nearer to the one that needs most
-EVEN, PEAKS, CLOSER, ROUNDS = 17, 12, 7, 3
+#: rounding of a coefficient of friction
+CLOSE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,39 +93,25 @@ def hold(wheels: Wheels, ground: Ground, body: Carriage, rolled: Rolled, ok: Boo
 
 
 def _require(stance: Stance, rows: IntArray, used: Array, required: Array) -> None:
-    """The least friction at some of the samples ``rows`` into ``required``: evenly, where the forces of least square
-    use most (``used`` (T,), which is a bound of it), and closer where it is most."""
-    from bodyplan.solve import required_friction
+    """The largest of the least friction at the samples ``rows``, and what it is at those that had to be looked at, into
+    ``required``.
 
+    Any forces that hold a body are a bound of what it needs: at first those of least square (``used`` (T,)), then those
+    that need least at another sample, mended so that they balance here. The sample of the largest bound is solved next,
+    until no bound is larger than what is known.
+    """
     if not len(rows):
         return
-
-    def look(places: IntArray) -> None:
-        at = rows[places]
-        few = stance.take(at)
-        required[at] = required_friction(few.points, few.normals, few.center, few.weight).mu
-
-    bound = used[rows]
-    padded = np.concatenate([[-np.inf], bound, [-np.inf]])
-    peaks = np.flatnonzero((padded[1:-1] > padded[:-2]) & (padded[1:-1] >= padded[2:]))
-    peaks = peaks[np.argsort(-bound[peaks], kind="stable")[:PEAKS]]
-    places = np.union1d(_spread(len(rows), EVEN), peaks)
-    look(places)
-    for _ in range(ROUNDS):
-        most = int(np.argmax(required[rows[places]]))
-        near = np.arange(places[max(most - 1, 0)], places[min(most + 1, len(places) - 1)] + 1)
-        near = np.setdiff1d(near[_spread(len(near), CLOSER)], places)
-        # nothing is needed beyond what is used
-        near = near[bound[near] > required[rows[places]].max()]
-        if not len(near):
-            return
-        look(near)
-        places = np.union1d(places, near)
-
-
-def _spread(count: int, most: int) -> IntArray:
-    """At most so many of ``count`` indices, evenly."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+    few = stance.take(rows)
+    least = LeastFriction.of(few.points, few.normals, few.center, few.weight)
+    bound, most = used[rows], -1.0
+    while bound.max() > most + CLOSE * max(1.0, most):
+        i = int(bound.argmax())
+        found = least.at(i)
+        required[rows[i]], most = found.s, max(most, found.s)
+        if found.attained:
+            bound = np.fmin(bound, least.bounds(i, found.x))
+        bound[i] = -np.inf
 
 
 def judged(verdict: Verdict, holding: Holding | str, t: Array) -> Verdict:

@@ -95,7 +95,7 @@ def maps(
 
             some = stance.take(rows)
             given = (some.points, some.normals, some.center, some.weight)
-            required[rows] = required_friction(*given).mu
+            required[rows] = required_friction(*given, forces=False).mu
             if np.ptp(friction) == 0.0:
                 status[rows[required[rows] > friction[0]]] = Status.SLIPS.value
                 status[rows[np.isinf(required[rows])]] = Status.TIPS_OVER.value

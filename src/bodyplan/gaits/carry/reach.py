@@ -22,6 +22,8 @@ from bodyplan.robot.model import Robot
 #: m to which a height is found
 CLOSE = 1e-12
 _STEPS = 80
+#: points of a rim's lower half that are looked at first; steps and rad a step of what follows
+_ANGLES, _REFINED, _TURN = 65, 12, 0.1
 
 
 @dataclass(frozen=True)
@@ -94,20 +96,17 @@ def heights(
     up = stands(ground, xy, np.ones(len(xy)), mode) - origin
     planes = planes_of(wheels, origin, rotation)
     direction = np.tile(up, (len(wheels), 1))
-    ends = []
-    for which in (0, 1):
-        wanted = np.repeat([wheel.range[which] for wheel in wheels], len(xy))
-        ends.append(_height_of(land, planes, direction, wanted).reshape(len(wheels), len(xy)))
-    return ends[0], ends[1]
+    # both ends in one go: the smallest radius of every wheel, then the largest
+    wanted = np.repeat([wheel.range[which] for which in (0, 1) for wheel in wheels], len(xy))
+    twice = np.tile(np.arange(len(planes)), 2)
+    found = _height_of(land, planes.take(twice), direction[twice], wanted).reshape(2, len(wheels), len(xy))
+    return found[0], found[1]
 
 
 def _height_of(land: Terrain, planes: Planes, direction: Array, radius: Array) -> Array:
     """The height (n,) along ``direction`` (n, 3) at which wheels, at ``planes`` for height 0, touch with ``radius``
     (n,): Newton with dR/dh = -N . d / N . u, kept between bounds that only come nearer."""
-    with np.errstate(all="ignore"):
-        floor = land.field_jet(planes.centre[:, 0], planes.centre[:, 1])[0]
-    # from where the axle would be in the ground, and about the radius higher
-    h = np.where(np.isfinite(floor), floor - planes.centre[:, 2] + radius, np.nan)
+    h, chi = _guess(land, planes, direction, radius)
     low, high = np.full(len(h), -np.inf), np.full(len(h), np.inf)
     active = np.flatnonzero(np.isfinite(h))
     step = np.zeros_like(h)
@@ -117,7 +116,7 @@ def _height_of(land: Terrain, planes: Planes, direction: Array, radius: Array) -
         d = direction[active]
         some = planes.take(active)
         here = Planes(some.centre + h[active, None] * d, some.ahead, some.up, some.lean, some.flat)
-        found = contact.find(land, here)
+        found = contact.find(land, here, chi[active] - some.lean)
         touches = found.outcome == contact.TOUCHES
         sunk = found.outcome == contact.AXLE_BELOW
         miss = np.where(touches, found.radius - radius[active], -radius[active])
@@ -130,12 +129,56 @@ def _height_of(land: Terrain, planes: Planes, direction: Array, radius: Array) -
         # along an upright face the radius does not change
         way = np.where(touches & np.isfinite(newton), newton, np.copysign(radius[active], -miss))
         trial = h[active] + way
-        both = 0.5 * (low[active] + high[active])
+        with np.errstate(invalid="ignore"):
+            both = 0.5 * (low[active] + high[active])
         outside = (trial <= low[active]) | (trial >= high[active])
         trial = np.where(outside & np.isfinite(both), both, trial)
         step[active] = trial - h[active]
         h[active] = np.where(touches | sunk, trial, np.nan)
+        chi[active] = np.where(touches, found.phi + some.lean, chi[active])
         done = (np.abs(step[active]) <= CLOSE) & touches
         active = active[~done & np.isfinite(h[active])]
     h[active] = np.nan
     return h
+
+
+def _guess(land: Terrain, planes: Planes, direction: Array, radius: Array) -> tuple[Array, Array]:
+    """Where to start: the height (n,) and the contact angle chi (n,) at which the rim, lowered from above, meets the
+    ground first. Of a few points of its lower half the one that meets it highest, then Newton on the two equations of
+    the contact with the radius given. Nothing relies on it."""
+    count = len(planes)
+    with np.errstate(all="ignore"):
+        floor = land.field_jet(planes.centre[:, 0], planes.centre[:, 1])[0]
+        # from where the axle would be in the ground, and about the radius higher
+        plain = np.where(np.isfinite(floor), floor - planes.centre[:, 2] + radius, np.nan)
+        rise = np.sum(direction * [0.0, 0.0, 1.0], axis=1)
+        angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ANGLES + 2)[1:-1]
+        rim = np.sin(angles)[:, None, None] * planes.ahead - np.cos(angles)[:, None, None] * planes.up
+        at = (planes.centre + plain[:, None] * direction + radius[:, None] * rim).reshape(-1, 3)
+        gap = (land.field_jet(at[:, 0], at[:, 1])[0] - at[:, 2]).reshape(_ANGLES, count) / rise
+        gap = np.where(np.isfinite(gap), gap, -np.inf)
+        best = gap.argmax(axis=0)
+        chi, h = angles[best], plain + gap[best, np.arange(count)]
+        for _ in range(_REFINED):
+            sine, cosine = np.sin(chi)[:, None], np.cos(chi)[:, None]
+            u, t = sine * planes.ahead - cosine * planes.up, cosine * planes.ahead + sine * planes.up
+            at = planes.centre + h[:, None] * direction + radius[:, None] * u
+            f, g, H = land.field_jet(at[:, 0], at[:, 1])
+            N = np.concatenate([-g, np.ones((count, 1))], axis=1)
+            off, tangent = at[:, 2] - f, np.sum(N * t, axis=1)
+            Ht = np.einsum("nij,nj->ni", H, t[:, :2])
+            a, b = np.sum(N * direction, axis=1), radius * tangent
+            c, d = (
+                -np.sum(Ht * direction[:, :2], axis=1),
+                -np.sum(N * u, axis=1) - radius * np.sum(Ht * t[:, :2], axis=1),
+            )
+            determinant = a * d - b * c
+            turn = np.clip(-(a * tangent - c * off) / determinant, -_TURN, _TURN)
+            # the height follows the turn, so that the point stays on the ground
+            climb = -(off + b * turn) / a
+            good = np.isfinite(turn) & np.isfinite(climb)
+            chi, h = np.where(good, chi + turn, chi), np.where(good, h + climb, h)
+            if not np.any(good & (np.abs(climb) + radius * np.abs(turn) > CLOSE)):
+                break
+    sane = np.isfinite(h) & (np.abs(chi) < 0.5 * np.pi)
+    return np.where(sane, h, plain), np.where(sane, chi, 0.0)

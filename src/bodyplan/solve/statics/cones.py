@@ -1,4 +1,4 @@
-"""Friction cones: the nearest force within them, and how it follows what is asked for."""
+"""Friction cones: what contacts may do, and how far forces are from it."""
 
 from __future__ import annotations
 
@@ -34,30 +34,6 @@ class Cones:
             kind = np.where(touching, kind, NOTHING)
         return Cones(kind, mu, np.tile([1.0, 0.0, 0.0], (len(mu), 1)))
 
-    def nearest(self, z: Array) -> tuple[Array, Array, Array]:
-        """The nearest x (k, 3) to z (k, 3), its derivative D (k, 3, 3), and its derivative (k, 3) by mu."""
-        mu, r = self.mu, np.hypot(z[:, 1], z[:, 2])
-        way = z[:, 1:] / np.where(r > 0.0, r, 1.0)[:, None]
-        along = (z[:, 0] + mu * r) / (1.0 + mu**2)
-        slope = r / (1.0 + mu**2) - 2.0 * mu * along / (1.0 + mu**2)
-        edge = np.concatenate([np.ones((len(mu), 1)), mu[:, None] * way], axis=1)
-        D = edge[:, :, None] * edge[:, None, :] / (1.0 + mu**2)[:, None, None]
-        turns = mu * along / np.where(r > 0.0, r, 1.0)
-        D[:, 1:, 1:] += turns[:, None, None] * (np.eye(2) - way[:, :, None] * way[:, None, :])
-        x = along[:, None] * edge
-        by_mu = slope[:, None] * edge
-        by_mu[:, 1:] += along[:, None] * way
-
-        inside, outside = r <= mu * z[:, 0], mu * r <= -z[:, 0]
-        x, D = np.where(inside[:, None], z, x), np.where(inside[:, None, None], np.eye(3), D)
-        push = np.sum(z * self.ray, axis=1)
-        is_ray = self.kind == RAY
-        x = np.where(is_ray[:, None], np.maximum(push, 0.0)[:, None] * self.ray, x)
-        D = np.where(is_ray[:, None, None], self.ray[:, :, None] * self.ray[:, None, :], D)
-        none = (self.kind == NOTHING) | np.where(is_ray, push <= 0.0, outside)
-        x, D = np.where(none[:, None], 0.0, x), np.where(none[:, None, None], 0.0, D)
-        return x, D, np.where((none | inside | is_ray)[:, None], 0.0, by_mu)
-
     def outside(self, x: Array) -> Array:
         """(..., k): how far x (..., k, 3) is outside of its cone or off its ray, 0 where within."""
         excess = np.maximum(np.hypot(x[..., 1], x[..., 2]) - self.mu * x[..., 0], -x[..., 0])
@@ -75,3 +51,39 @@ def ratios(x: Array) -> Array:
     some = size > ROUNDING * size.max(axis=-1, keepdims=True, initial=0.0)
     pushes = some & (n > 0.0)
     return np.where(pushes, r / np.where(pushes, n, 1.0), np.where(some, np.inf, 0.0))
+
+
+@dataclass(frozen=True)
+class Family:
+    """Cones of coefficient min(``cap`` (k,), s ``slope`` (k,)) for every s >= 0; ``touching`` (k,)."""
+
+    slope: Array
+    cap: Array
+    touching: BoolArray
+
+    @property
+    def kind(self) -> IntArray:
+        free = (self.slope > 0.0) & (self.cap > 0.0)
+        return np.where(self.touching, np.where(free, CONE, RAY), NOTHING)
+
+    def at(self, s: float) -> Cones:
+        """The cones of factor s."""
+        return Cones(self.kind, np.minimum(self.cap, s * self.slope), self._along)
+
+    @property
+    def widest(self) -> Cones:
+        """The cones of all contacts at their caps."""
+        return Cones(self.kind, self.cap, self._along)
+
+    @property
+    def _along(self) -> Array:
+        return np.tile([1.0, 0.0, 0.0], (len(self.slope), 1))
+
+    def needs(self, x: Array) -> float:
+        """The least s whose cones have x in them, inf where none has."""
+        r = ratios(x)
+        loaded = r > 0.0
+        free = loaded & (self.kind == CONE) & (r <= self.cap * (1.0 + 1e-9))
+        if np.any(loaded & ~free):
+            return np.inf
+        return float((r[free] / self.slope[free]).max(initial=0.0))

@@ -170,11 +170,19 @@ def frames_of(normals: Array) -> Array:
 
 def balance(equations: Array, load: Array) -> Balance:
     """Orthonormal equations of one item, without those that say the same twice: equations (6, 3k), load (6,)."""
+    return balances_of(equations[None], load[None])[0]
+
+
+def balances_of(equations: Array, load: Array) -> list[Balance]:
+    """:func:`balance` of n items: equations (n, 6, 3k), load (n, 6)."""
     U, s, V = np.linalg.svd(equations, full_matrices=False)
-    rank = int(np.sum(s > RANK * s.max(initial=0.0)))
-    held = U[:, :rank].T @ -load
-    left = float(np.linalg.norm(load + U[:, :rank] @ held))
-    return Balance(V[:rank], held / s[:rank], left, U[:, :rank], s[:rank])
+    ranks = np.sum(s > RANK * s.max(axis=1, keepdims=True, initial=0.0), axis=1)
+    turned = np.einsum("nij,ni->nj", U, -load)
+    out = []
+    for i, rank in enumerate(ranks.tolist()):
+        left = float(np.linalg.norm(load[i] + U[i, :, :rank] @ turned[i, :rank]))
+        out.append(Balance(V[i, :rank], turned[i, :rank] / s[i, :rank], left, U[i, :, :rank], s[i, :rank]))
+    return out
 
 
 # --- checked input ------------------------------------------------------------------------------------------

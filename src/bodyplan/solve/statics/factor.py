@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.solve.statics.cones import CONE, NOTHING, RAY, Cones, ratios
+from bodyplan.arrays import Array, BoolArray
+from bodyplan.solve.statics.cones import CONE, NOTHING, RAY, Cones, Family
 from bodyplan.solve.statics.conic import least_excess
 from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, balance
 from bodyplan.solve.statics.polish import WARM, PolishedRatio, polish_ratio
@@ -29,35 +28,6 @@ PROVED = 1e-11
 
 #: x, y and s of a similar problem
 Start = tuple[Array, Array, float]
-
-
-@dataclass(frozen=True)
-class Family:
-    """Cones of coefficient min(``cap`` (k,), s ``slope`` (k,)) for every s >= 0; ``touching`` (k,)."""
-
-    slope: Array
-    cap: Array
-    touching: BoolArray
-
-    @property
-    def kind(self) -> IntArray:
-        free = (self.slope > 0.0) & (self.cap > 0.0)
-        return np.where(self.touching, np.where(free, CONE, RAY), NOTHING)
-
-    def at(self, s: float) -> tuple[Cones, Array]:
-        """The cones of factor s, and the rate of their coefficients by s."""
-        mu = np.minimum(self.cap, s * self.slope)
-        along = np.tile([1.0, 0.0, 0.0], (len(mu), 1))
-        return Cones(self.kind, mu, along), np.where(s * self.slope < self.cap, self.slope, 0.0)
-
-    def needs(self, x: Array) -> float:
-        """The least s whose cones have x in them, inf where none has."""
-        r = ratios(x)
-        loaded = r > 0.0
-        free = loaded & (self.kind == CONE) & (r <= self.cap * (1.0 + 1e-9))
-        if np.any(loaded & ~free):
-            return np.inf
-        return float((r[free] / self.slope[free]).max(initial=0.0))
 
 
 class Factor(NamedTuple):
@@ -109,15 +79,15 @@ def least_factor(A: Array, b: Array, family: Family, start: Start | None = None)
     method finishes. ``start``: x, y and s of a similar item, tried first.
     """
     k, nothing = len(family.slope), np.zeros(len(b))
+    if start is not None:
+        done = polish_ratio(A, b, family, *start, steps=WARM)
+        if _proved(A, family, done):
+            return Factor(done.s, done.x, done.y, family.touching)
     normal = along_normals(A, b)
     if normal is not None:
         return Factor(0.0, normal[:, None] * np.array([1.0, 0.0, 0.0]), nothing, family.touching)
     if not holds_with_any_friction(A, b, family.kind == CONE):
         return Factor(np.inf, np.zeros((k, 3)), nothing, family.touching)
-    if start is not None:
-        done = polish_ratio(A, b, family.at, *start, steps=WARM)
-        if _proved(A, family, done):
-            return Factor(done.s, done.x, done.y, family.touching)
     return _searched(A, b, family)
 
 
@@ -129,7 +99,7 @@ def _searched(A: Array, b: Array, family: Family) -> Factor:
         found = _descended(A, b, family, bound, s, high)
         if found.exact:
             return found
-        idle = _idle(A, family.at(found.s)[0], found) if np.isfinite(found.s) else np.zeros(k, dtype=bool)
+        idle = _idle(A, family.at(found.s), found) if np.isfinite(found.s) else np.zeros(k, dtype=bool)
         if idle.any():
             fewer = _without(A, b, family, idle)
             if fewer.s <= found.s:
@@ -182,7 +152,7 @@ def _finished(A: Array, b: Array, family: Family, x: Array, y: Array, s: float) 
     """The exact solution near (x, y, s); its residual is inf where it proves nothing. Where contacts carry next to
     nothing it may not show at once which of them carry nothing: then from the solution without them."""
     size = np.linalg.norm(x, axis=1)
-    done = polish_ratio(A, b, family.at, x, y, s)
+    done = polish_ratio(A, b, family, x, y, s)
     for share in FAINT:
         if _proved(A, family, done):
             return done
@@ -190,9 +160,9 @@ def _finished(A: Array, b: Array, family: Family, x: Array, y: Array, s: float) 
         if loaded.all():
             continue
         some = Family(family.slope, family.cap, family.touching & loaded)
-        first = polish_ratio(A, b, some.at, np.where(loaded[:, None], x, 0.0), y, s)
+        first = polish_ratio(A, b, some, np.where(loaded[:, None], x, 0.0), y, s)
         if first.residual <= PROVED:
-            done = polish_ratio(A, b, family.at, first.x, first.y, first.s, WARM)
+            done = polish_ratio(A, b, family, first.x, first.y, first.s, WARM)
     return done if _proved(A, family, done) else done._replace(residual=np.inf)
 
 
@@ -233,7 +203,7 @@ def _squeezed(A: Array, family: Family, found: Factor) -> Factor:
         return Factor(0.0, none, found.y, found.kept, attained=False)
     x = found.x * k / found.x[:, 0].sum()
     y = _multipliers(held.A, A.T @ found.y)
-    done = polish_ratio(held.A, held.b, family.at, x, y, found.s)
+    done = polish_ratio(held.A, held.b, family, x, y, found.s)
     s, exact = done.s, _proved(held.A, family, done)
     if not exact or abs(s - found.s) > NEAR * (1.0 + found.s):
         stress = _descended(held.A, held.b, family, MODERATE * k, found.s, np.inf)

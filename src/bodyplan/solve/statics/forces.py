@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status, UnknownNameError
-from bodyplan.solve.statics.cones import CONE, RAY, Cones, ratios
+from bodyplan.solve.statics.cones import CONE, RAY, Cones, Family, ratios
 from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, Memory, balance, friction
-from bodyplan.solve.statics.factor import Factor, Family, Start, least_factor
+from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import SHORT, Solved, at_least_factor, solve_item
 from bodyplan.solve.statics.outcome import Outcome, shaped
 

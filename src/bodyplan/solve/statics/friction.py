@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array
 from bodyplan.errors import Status
-from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, Memory, balance
-from bodyplan.solve.statics.factor import Factor, Family, least_factor
+from bodyplan.solve.statics.cones import Family, ratios
+from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, Loads, Memory, balances_of
+from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import at_least_factor
 from bodyplan.solve.statics.outcome import Outcome, shaped
 
@@ -42,39 +44,33 @@ def required_friction(
     *,
     wrench: ArrayLike | None = None,
     touching: ArrayLike | None = None,
+    forces: bool = True,
 ) -> RequiredFriction:
     """The least friction coefficient, the same at all contacts, with which a body is in equilibrium.
 
     Arguments as of :func:`contact_forces`; without a ``wrench`` the size of the weight does not matter. On a plane it
-    is the slope (the tangent of its angle) as long as the weight passes between the contacts.
+    is the slope (the tangent of its angle) as long as the weight passes between the contacts. ``forces``: False leaves
+    them out (nan), for a third of the work.
     Needs the extra "solve" unless forces along the normals balance. Raises InputError as :func:`contact_forces` does.
     """
     loads = Loads.of(points, normals, com, weight, wrench, touching)
+    least = LeastFriction(loads)
     n, k = loads.count, loads.contacts
     mu, x = np.zeros(n), np.zeros((n, k, 3))
     attained = np.ones(n, dtype=bool)
     status = np.full(n, Status.OK.value, dtype="<U16")
     reasons = np.full(n, "", dtype=object)
-    equations = loads.equations()
-    memory: tuple[Memory, float] | None = None
     for i in range(n):
         if loads.force[i] == 0.0:
             continue
-        held = balance(equations[i], loads.load[i])
-        family = Family(np.ones(k), np.full(k, np.inf), loads.touching[i])
-        found = Factor(np.inf, np.full((k, 3), np.nan), np.zeros(len(held.b)), loads.touching[i])
-        if held.left <= ROUNDING:
-            start = None if memory is None else (*loads.recall(i, held, memory[0]), memory[1])
-            found = least_factor(held.A, held.b, family, start)
-        resumable = found.resumable(loads.touching[i])
-        memory = (loads.remember(i, held, found.x, found.y), found.s) if resumable else None
+        found = least.at(i)
         mu[i], attained[i], x[i] = found.s, found.attained, np.nan
         if not np.isfinite(found.s):
             status[i] = Status.TIPS_OVER.value
             reasons[i] = "no contacts that only push hold it, whatever their friction"
             attained[i] = False
-        elif found.attained:
-            solved = at_least_factor(held, family, found)
+        elif found.attained and forces:
+            solved = at_least_factor(least.balances[i], least.family(i), found)
             x[i] = found.x if solved is None else solved.x
         if np.isfinite(found.s) and not found.exact:
             status[i] = Status.NOT_CONVERGED.value
@@ -86,3 +82,53 @@ def required_friction(
         status=shaped(status, loads.shape),
         reasons=shaped(reasons, loads.shape),
     )
+
+
+class LeastFriction:
+    """The least common coefficient of the items of ``loads``, in any order; each starts from the item nearest in number
+    that is known, which saves work and decides nothing."""
+
+    def __init__(self, loads: Loads) -> None:
+        self.loads, self._equations = loads, loads.equations()
+        self.balances = balances_of(self._equations, loads.load)
+        self._memories: dict[int, tuple[Memory, float]] = {}
+
+    @staticmethod
+    def of(points: ArrayLike, normals: ArrayLike, com: ArrayLike, weight: ArrayLike) -> LeastFriction:
+        """For arguments of :func:`required_friction`."""
+        return LeastFriction(Loads.of(points, normals, com, weight, None, None))
+
+    def family(self, i: int) -> Family:
+        """The cones of item i: one coefficient for all contacts."""
+        k = self.loads.contacts
+        return Family(np.ones(k), np.full(k, np.inf), self.loads.touching[i])
+
+    def at(self, i: int) -> Factor:
+        """The least coefficient of item i, whose load is not zero."""
+        loads, held = self.loads, self.balances[i]
+        if held.left > ROUNDING:
+            return Factor(np.inf, np.full((loads.contacts, 3), np.nan), np.zeros(len(held.b)), loads.touching[i])
+        start: Start | None = None
+        if self._memories:
+            memory, s = self._memories[min(self._memories, key=lambda j: abs(j - i))]
+            start = (*loads.recall(i, held, memory), s)
+        found = least_factor(held.A, held.b, self.family(i), start)
+        if found.resumable(loads.touching[i]):
+            self._memories[i] = loads.remember(i, held, found.x, found.y), found.s
+        return found
+
+    def bounds(self, i: int, x: Array) -> Array:
+        """(n,): coefficients with which the items balance for certain, by forces x (k, 3) of item i and the smallest
+        ones that mend what these leave over; inf where that pulls."""
+        world = self.loads.frames[i] @ x[..., None] * self.loads.force[i]
+        with np.errstate(all="ignore"):
+            here = (np.swapaxes(self.loads.frames, -1, -2) @ world)[..., 0] / self.loads.force[:, None, None]
+            flat = here.reshape(len(here), -1)
+            rest = np.einsum("nij,nj->ni", self._equations, flat) + self.loads.load
+            mended = (flat - np.einsum("nij,ni->nj", self._inverse, rest)).reshape(here.shape)
+        return np.where(np.isfinite(mended).all(axis=(1, 2)), ratios(mended).max(axis=1), np.inf)
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """(n, 6, 3k): transposed pseudo-inverses of the equations."""
+        return np.swapaxes(np.linalg.pinv(self._equations, rcond=RANK), -1, -2)

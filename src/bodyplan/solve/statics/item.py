@@ -8,10 +8,10 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
-from bodyplan.solve.statics.cones import CONE, RAY, Cones
+from bodyplan.solve.statics.cones import CONE, RAY, Cones, Family
 from bodyplan.solve.statics.conic import least
 from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, Balance, balance
-from bodyplan.solve.statics.factor import PROVED, Factor, Family, faces, holds_with_any_friction, least_factor
+from bodyplan.solve.statics.factor import PROVED, Factor, faces, holds_with_any_friction, least_factor
 from bodyplan.solve.statics.polish import WARM, polish_norm
 
 #: share by which friction may be short of what is needed, or more than it
@@ -116,7 +116,7 @@ def solve_item(held: Balance, mu: Array, touching: BoolArray, start: Array | Non
 
 def at_least_factor(held: Balance, family: Family, found: Factor) -> Solved | None:
     """The smallest forces with the least factor of friction; None where they cannot be proved so."""
-    cones, _ = Family(family.slope, family.cap, found.kept).at(found.s)
+    cones = Family(family.slope, family.cap, found.kept).at(found.s)
     narrow = faces(held.A, cones, found.y) if found.s > 0.0 else Cones.of(np.zeros(len(cones.mu)), found.kept)
     equations = on_faces(held.A, held.b, narrow)
     best = smallest(equations, narrow) if equations.left <= CONSISTENT else None
