@@ -51,8 +51,9 @@ class Bounds(NamedTuple):
 class Pose(NamedTuple):
     """Room for one pose: ``start``, ``offset`` and ``anchors`` (N, 2) m, ``origins`` (2 N, 2) m of all links with the
     tail link and the head link, cosine and sine ``turn`` (2 N, 2) of their angles, ``angles`` (2 N,) rad, ``short`` and
-    ``square`` (N - 1,) m^2 of the legs, and room (7, P) for :func:`overlap`. What moves with no anchor that moves is
-    laid once for a move: ``fresh`` (1,) says that it is not there yet."""
+    ``square`` (N - 1,) m^2 of the legs, and room (P, 9) for :func:`overlap`. What moves with no anchor that moves is
+    laid once for a move: ``fresh`` (2,) says that it is not there yet, nor the parts on it, ``moved`` (2 N,) which
+    links were laid last."""
 
     start: Array
     offset: Array
@@ -64,6 +65,7 @@ class Pose(NamedTuple):
     square: Array
     work: Array
     fresh: BoolArray
+    moved: BoolArray
 
 
 @njit(cache=True)
@@ -81,8 +83,9 @@ def room_for(bounds: Bounds) -> Pose:
         np.zeros(2 * count),
         np.zeros(count - 1),
         np.zeros(count - 1),
-        np.zeros((7, len(bounds.link))),
-        np.ones(1, dtype=np.bool_),
+        np.zeros((len(bounds.link), 9)),
+        np.ones(2, dtype=np.bool_),
+        np.ones(2 * count, dtype=np.bool_),
     )
 
 
@@ -91,16 +94,18 @@ def lay(bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, 
     """The snake at ``tau`` of move ``m``; NaN where a leg does not reach."""
     links, count = bounds.links, before.shape[1]
     swing_of(before, after, lift, early, m, tau, pose.start, pose.offset)
-    anchors, origins, turn = pose.anchors, pose.origins, pose.turn
-    anchors[:] = pose.start + pose.offset
+    anchors, origins, turn, moved = pose.anchors, pose.origins, pose.turn, pose.moved
+    moved[:] = pose.fresh[0]
+    for i in range(count):
+        anchors[i, 0] = pose.start[i, 0] + pose.offset[i, 0]
+        anchors[i, 1] = pose.start[i, 1] + pose.offset[i, 1]
+        if before[m, i, 0] != after[m, i, 0] or before[m, i, 1] != after[m, i, 1] or lift[m, i] != 0.0:
+            for k in range(max(2 * i - 1, 0), min(2 * i + 3, 2 * count)):
+                moved[k] = True
     for i in range(count - 1):
-        still = True
-        for k in (i, i + 1):
-            still = still and before[m, k, 0] == after[m, k, 0] and before[m, k, 1] == after[m, k, 1]
-            still = still and lift[m, k] == 0.0
-        if still and not pose.fresh[0]:
-            continue
         a, b, rear = links[2 * i], links[2 * i + 1], 2 * i + 1
+        if not moved[rear]:
+            continue
         x, z, short = chord_of(pose.start, pose.offset, i, (a + b) ** 2)
         pose.short[i], pose.square[i] = short, x * x + z * z
         along, up = elbow(a, b, x, z, short)
@@ -155,8 +160,20 @@ def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: 
     if len(bounds.link) and known:
         # of those that are clear of each other it does not matter by how much where only that is asked
         least_found = -bounds.most if enough == np.inf else 0.0
+        if pose.fresh[1]:
+            pose.moved[:] = True
+            pose.fresh[1] = False
         own, other = overlap(
-            origins, pose.turn, bounds.link, bounds.ends, bounds.need, bounds.leg, bounds.most, least_found, pose.work
+            origins,
+            pose.turn,
+            bounds.link,
+            bounds.ends,
+            bounds.need,
+            bounds.leg,
+            bounds.most,
+            least_found,
+            pose.moved,
+            pose.work,
         )
         out[COLLAPSED], out[CROSSING] = max(out[COLLAPSED], own / size), other / size
 
@@ -197,7 +214,7 @@ def worst(
     pose, found = room_for(bounds), np.empty(len(DEMANDS))
     values, at = np.empty((coarse, len(DEMANDS))), np.empty(len(DEMANDS))
     for m in range(len(before)):
-        pose.fresh[0] = True
+        pose.fresh[:] = True
         for p in range(coarse):
             lay(bounds, before, after, lift, early, m, p / (coarse - 1.0), pose)
             excess(bounds, swinging[m], pose, np.inf, found)

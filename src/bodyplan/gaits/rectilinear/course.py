@@ -12,7 +12,7 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import Demands, move_names, phases
 from bodyplan.gaits.rectilinear.moves import Moves
-from bodyplan.gaits.rectilinear.search import search
+from bodyplan.gaits.rectilinear.search import NARROW, WIDE, Way, search
 from bodyplan.gaits.rectilinear.sequence import Sequence
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.gaits.rectilinear.strides import (
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 MOVE_TIME = 1.0
 #: s: no move counts as shorter
 SHORT = 1e-2
+#: share of the pace over level ground at which a way over steps that is found quickly is good enough
+BRISK = 0.65
 #: most cycles of a gait that does not repeat
 MOST_CYCLES = 400
 
@@ -44,14 +46,14 @@ def course_of(gait: Rectilinear, snake: InchingSnake, track: Track, until: float
     room = room_above(gait, snake, track)
     demands = snake.demands(room, gait.least_margin)
     least = least_time(gait, demands)
+    if not track.level and gait.drive == "fastest":
+        return _over_steps(gait, snake, track, demands, until, least)
     found = _stride(gait, snake.robot, room)
     if track.level:
         if found is not None and found.status == Status.OK:
             return _repeated(found, snake, track, gait)
         if found is not None or gait.drive in ("fastest", "periodic"):
             return _refused(gait, snake, track, demands, found)
-    if not track.level and gait.drive == "fastest":
-        return _over_steps(gait, snake, track, demands, found, until, least)
     return _by_rule(gait, snake, track, demands, found, until, least)
 
 
@@ -202,13 +204,12 @@ def _over_steps(
     snake: InchingSnake,
     track: Track,
     demands: Demands,
-    found: Stride | None,
     until: float,
     least: float,
 ) -> Sequence:
     """The fastest way over steps that the search finds."""
     walker = Walker(snake, track, demands, gait.lift_of(demands), gait.clearance_of(demands))
-    local = _local(gait, snake, track, found, least)
+    local = _local(gait, snake, track, least)
     spacings = gait.spacings(demands) if local is None else local.spacings
     start = walker.stand(snake.tail + np.concatenate([[0.0], np.cumsum(spacings)]))
     still = Moves(start[None], start[None], np.zeros((1, len(start))), np.ones((1, len(start))), ("stands",))
@@ -225,19 +226,35 @@ def _over_steps(
     pace = local.stride / size
     wanted = int(min(most, np.ceil(until / a_move - 1e-9)))
     walker = replace(walker, short=np.diff(local.moves.after[..., 0], axis=-1).min(axis=0))
-    way = search(walker, start, gait.schedule, wanted, pace)
-    if way.status != Status.OK and np.isfinite(track.steps.roof_z).any():
-        # a low place: come to it stretched
-        crouch = float(demands.straight.max())
-        other = search(replace(walker, crouch=crouch), start, gait.schedule, wanted, pace)
-        way = max(way, other, key=lambda w: (w.status == Status.OK, w.far))
+    way, tried = _way_on(walker, start, gait.schedule, wanted, pace)
+    reason = way.reason and f"{way.reason} ({tried} stances tried)"
     if not way.moves:
-        return Sequence(still, np.ones(1), 0.0, np.zeros(1, dtype=np.int64), None, way.status, way.reason)
+        return Sequence(still, np.ones(1), 0.0, np.zeros(1, dtype=np.int64), None, way.status, reason)
     moves = Moves.joined(way.moves)
-    return Sequence(moves, demands.durations(moves, least), gait.dwell, way.cycle, None, way.status, way.reason)
+    return Sequence(moves, demands.durations(moves, least), gait.dwell, way.cycle, None, way.status, reason)
 
 
-def _local(gait: Rectilinear, snake: InchingSnake, track: Track, found: Stride | None, least: float) -> Stride | None:
+def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: float) -> tuple[Way, int]:
+    """The best way that a narrow search finds at a good pace, or else a wide one at any; and how many stances were
+    tried. Where neither goes on under a ceiling the snake comes to low places stretched."""
+    walkers = [walker]
+    if np.isfinite(walker.track.steps.roof_z).any():
+        walkers.append(replace(walker, crouch=float(walker.demands.straight.max())))
+    tried, begin = 0, float(start[:, 0].mean())
+    ways: list[Way] = []
+    for breadth in (NARROW, WIDE):
+        ways = []
+        for each in walkers:
+            way = search(each, start, schedule, wanted, pace, breadth)
+            tried += way.tried
+            slow = way.far - begin < BRISK * wanted * pace
+            if way.status == Status.OK and not (slow and breadth is NARROW):
+                return way, tried
+            ways.append(way)
+    return max(ways, key=lambda w: (w.status == Status.OK, w.far)), tried
+
+
+def _local(gait: Rectilinear, snake: InchingSnake, track: Track, least: float) -> Stride | None:
     """The fastest gait under the lowest ceiling over the body where it begins."""
     reach = snake.tail + float(snake.links.sum()) + snake.head
     under = [track.ceiling]
@@ -247,7 +264,5 @@ def _local(gait: Rectilinear, snake: InchingSnake, track: Track, found: Stride |
     room = min(under) - track.floor - snake.rest - snake.top - gait.clearance_of(snake.demands(np.inf))
     if gait.ceiling is not None:
         room = min(room, gait.ceiling)
-    if not np.isfinite(room):
-        return found
     demands = snake.demands(room, gait.least_margin)
     return fastest(demands, gait.spacings(demands), gait.schedule, gait.lift_of(demands), least, gait.dwell)

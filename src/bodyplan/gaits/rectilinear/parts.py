@@ -82,12 +82,12 @@ def _overlaps(
     origins: Array, turns: Array, known: IntArray, link: IntArray, ends: Array, need: Array, leg: BoolArray, out: Array
 ) -> None:
     """Largest need - distance of two parts, into ``out`` (S, 2), of the states ``known``."""
-    turn, work = np.empty((turns.shape[1], 2)), np.empty((7, len(link)))
-    most = need.max()
+    turn, work = np.empty((turns.shape[1], 2)), np.empty((len(link), 9))
+    most, all_links = need.max(), np.ones(turns.shape[1], dtype=np.bool_)
     for s in known:
         for k in range(len(turn)):
             turn[k, 0], turn[k, 1] = np.cos(turns[s, k]), np.sin(turns[s, k])
-        out[s, 0], out[s, 1] = overlap(origins[s], turn, link, ends, need, leg, most, -most, work)
+        out[s, 0], out[s, 1] = overlap(origins[s], turn, link, ends, need, leg, most, -most, all_links, work)
 
 
 @njit(cache=True)
@@ -100,30 +100,39 @@ def overlap(
     leg: BoolArray,
     most: float,
     least: float,
+    moved: BoolArray,
     work: Array,
 ) -> tuple[float, float]:
     """Largest need - distance m of two parts of one leg, and of two of different legs, but not below ``least``, in one
     pose: ``origins`` (2 N, 2) m of all links, cosine and sine of their angles ``turn`` (2 N, 2). ``most``: the largest
-    ``need``; ``work`` (7, P) is written over."""
+    ``need``. Only links ``moved`` (2 N,) are looked at: what else there is lies in ``work`` (P, 9) from the last time,
+    and two parts of it were clear of each other then."""
     count = len(link)
-    at, low, high, ahead = work[:4].T, work[4], work[5], work[6]
+    at, low, high, ahead, bottom, top = work[:, :4], work[:, 4], work[:, 5], work[:, 6], work[:, 7], work[:, 8]
     own = other = least
     for p in range(count):
         k = link[p]
+        if not moved[k]:
+            continue
         for e in range(2):
             x, z = ends[p, e]
             at[p, 2 * e] = origins[k, 0] + turn[k, 0] * x - turn[k, 1] * z
             at[p, 2 * e + 1] = origins[k, 1] + turn[k, 1] * x + turn[k, 0] * z
         low[p], high[p] = min(at[p, 0], at[p, 2]), max(at[p, 0], at[p, 2])
+        bottom[p], top[p] = min(at[p, 1], at[p, 3]), max(at[p, 1], at[p, 3])
     ahead[count - 1] = low[count - 1]
     for p in range(count - 2, -1, -1):
         ahead[p] = min(low[p], ahead[p + 1])
     for i in range(count):
+        mine = moved[link[i]]
         for j in range(i + 1, count):
             if most - (ahead[j] - high[i]) <= min(own, other):
                 break
+            if need[i, j] <= 0.0 or not (mine or moved[link[j]]):
+                continue
             found = own if leg[i, j] else other
-            if need[i, j] > 0.0 and need[i, j] - max(low[j] - high[i], low[i] - high[j]) > found:
+            apart = max(low[j] - high[i], low[i] - high[j], bottom[j] - top[i], bottom[i] - top[j])
+            if need[i, j] - apart > found:
                 found = max(found, need[i, j] - _distance(at[i], at[j]))
                 if leg[i, j]:
                     own = found

@@ -21,19 +21,31 @@ from bodyplan.gaits.rectilinear.demands import move_names, phases
 from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.walker import Spot, Walker, Why
 
-#: states tried at once, those as good as the best to this many moves, and the most in all
-BATCH, NEAR, MOST_STATES = 16, 0.5, 3000
-#: states tried without coming farther after which there is no way on
-STUCK = 900
+#: places along a move at which it is tried when its turn comes, and those of the way that is found
+CLOSE, FINAL = 121, 361
+#: states as good as the best to this many moves are tried with it; the most in all, or for every move that is wanted
+NEAR, MOST_STATES, A_MOVE = 0.5, 3000, 40
 #: what a move counts in units of the pace over level ground: less than 1, so that slow places are gone through
 WEIGHT = 0.05
 #: what a phase counts in which nothing can move: it comes from what stands beside it, which is to be tried otherwise
 #: before all that stands elsewhere
 HELD = 1.0
-#: share of the mean link within which two stances count as alike
-ALIKE = 0.1
-#: share of it by which one of two alike must be ahead of the other to be tried as well: strides may be small
+#: share of the mean link by which one of two alike stances must be ahead to be tried as well: strides may be small
 STEP = 0.005
+
+
+@dataclass(frozen=True)
+class Breadth:
+    """How widely is searched: ``batch`` states at once; ``alike``: share of the mean link within which two stances
+    count as one; ``stuck``: states tried without coming farther after which there is no way on."""
+
+    batch: int
+    alike: float
+    stuck: int
+
+
+#: a few stances that differ much find most ways; where they do not, many that differ little decide
+NARROW, WIDE = Breadth(8, 0.4, 300), Breadth(16, 0.1, 900)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +69,14 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """``moves`` with the number of their ``cycle`` (M,); ``status`` with the ``reason`` where it does not go on."""
+    """``moves`` with the number of their ``cycle`` (M,); ``status`` with the ``reason`` where it does not go on;
+    ``tried``: how many states were."""
 
     moves: list[Moves]
     cycle: IntArray
     status: Status
     reason: str
+    tried: int = 0
 
     @property
     def far(self) -> float:
@@ -70,7 +84,7 @@ class Way:
         return float(self.moves[-1].after[0, :, 0].mean()) if self.moves else -np.inf
 
 
-def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) -> Way:
+def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, breadth: Breadth = WIDE) -> Way:
     """The way over the steps from anchors ``start`` (N, 2) in ``most`` moves; ``pace`` m a move is that over level
     ground.
 
@@ -85,25 +99,30 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
     best = _State(start)
     heapq.heappush(heaps[0], (0.0, next(counter), best))
     expanded, last = 0, 0
-    while expanded < MOST_STATES and expanded - last < STUCK and any(heaps):
+    wrong: set[_State] = set()
+    while expanded < max(MOST_STATES, A_MOVE * most) and expanded - last < breadth.stuck and any(heaps):
         phase = min((k for k, heap in enumerate(heaps) if heap), key=lambda k: heaps[k][0][0])
         first = heaps[phase][0][0]
         batch: list[_State] = []
-        while heaps[phase] and len(batch) < BATCH and heaps[phase][0][0] <= first + NEAR:
+        while heaps[phase] and len(batch) < breadth.batch and heaps[phase][0][0] <= first + NEAR:
             batch.append(heapq.heappop(heaps[phase])[2])
-        batch = _sound(walker, batch)
+        expanded += len(batch)
+        batch = _sound(walker, [s for s in batch if not wrong or not wrong.intersection(_line(s))])
         if not batch:
             continue
-        expanded += len(batch)
         ahead = max([best, *batch], key=lambda s: (round(s.far / (1e-6 * link)), -s.made))
         if ahead.far > best.far + STEP * link:
             last = expanded
         best = ahead
-        done = [s for s in batch if s.made >= most]
-        if done:
-            return _way(max(done, key=lambda s: s.far), Status.OK, "")
+        done = sorted((s for s in batch if s.made >= most), key=lambda s: -s.far)
+        for state in done:
+            bad = _flaw(walker, state)
+            if bad is None:
+                return _way(state, Status.OK, "", expanded)
+            wrong.add(bad)
+        batch = [s for s in batch if s.made < most]
         for state in [s for b in batch for s in _next(walker, b, groups[phase], names[phase], len(groups))]:
-            stance = (state.phase, *np.round(state.anchors[:, 0] / (ALIKE * link)).astype(int).tolist())
+            stance = (state.phase, *np.round(state.anchors[:, 0] / (breadth.alike * link)).astype(int).tolist())
             made, far = seen.get(stance, (most + 1, -np.inf))
             if state.made < made or state.far > far + STEP * link:
                 seen[stance] = min(made, state.made), max(far, state.far)
@@ -111,6 +130,10 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
                 heapq.heappush(
                     heaps[state.phase], (WEIGHT * state.made + HELD * state.held - gone, next(counter), state)
                 )
+    bad = _flaw(walker, best)
+    while bad is not None and bad.before is not None:
+        best = bad.before
+        bad = _flaw(walker, best)
     why: Why = Counter()
     for group, name in zip(groups, names, strict=True):
         for i in group:
@@ -120,25 +143,39 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float) 
     told = sorted(why.most_common(), key=lambda item: (item[0][1] not in ground, item[0][1] == reach))
     name, status = told[0][0] if told else (names[0], Status.OUT_OF_REACH)
     at = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.anchors[:, 0])} m"
-    return _way(best, status, f"No landing spot leads on {at}: {name}: {status}")
+    return _way(best, status, f"No landing spot leads on {at}: {name}: {status}", expanded)
 
 
-def _way(state: _State, status: Status, reason: str) -> Way:
-    moves, numbers = [], []
-    while state.before is not None:
-        if state.move is not None:
-            moves.append(state.move)
-            numbers.append(state.before.cycle)
-        state = state.before
-    return Way(moves[::-1], np.array(numbers[::-1], dtype=np.int64), status, reason)
+def _way(state: _State, status: Status, reason: str, tried: int) -> Way:
+    made = [s for s in _line(state) if s.move is not None]
+    cycles = [s.before.cycle for s in made if s.before is not None]
+    return Way([s.move for s in made if s.move is not None], np.array(cycles, dtype=np.int64), status, reason, tried)
+
+
+def _line(state: _State) -> list[_State]:
+    """The states that lead to this one, it last."""
+    out = [state]
+    while out[-1].before is not None:
+        out.append(out[-1].before)
+    return out[::-1]
+
+
+def _flaw(walker: Walker, state: _State) -> _State | None:
+    """The first state on the way to this one whose move runs into something between the places at which moves are
+    tried at first."""
+    made = [s for s in _line(state) if s.move is not None]
+    if not made:
+        return None
+    sound = walker.sound(Moves.joined([s.move for s in made if s.move is not None]), FINAL, True)
+    return next((s for s, good in zip(made, sound, strict=True) if not good), None)
 
 
 def _sound(walker: Walker, states: list[_State]) -> list[_State]:
-    """The states whose last move goes at many places, too."""
+    """The states whose last move goes with the whole body, and at more places, too."""
     some = [s.move for s in states if s.move is not None]
     if not some:
         return states
-    found = iter(walker.sound(Moves.joined(some)))
+    found = iter(walker.sound(Moves.joined(some), CLOSE))
     return [s for s in states if s.move is None or next(found)]
 
 

@@ -188,8 +188,14 @@ def fastest(demands: Demands, longest: Array, schedule: str, lift: float, least:
     straight = at(1.0, 1.0)
     if straight is None or np.all(straight.durations <= least):
         # no joint is too fast: the largest stride, from straight legs unless the lift forbids it
-        found = [straight, *(at(scale, 1.0) for scale in NEARLY_STRAIGHT)]
-        best = max(found, key=lambda f: _speed(f, dwell))
+        best = straight
+        for scale in NEARLY_STRAIGHT:
+            # no stride is larger than what the shortest leg leaves, no move faster than the least time
+            most = float(np.min(longest * scale - demands.least)) / (
+                len(phases(demands.anchors, schedule)) * (least + dwell)
+            )
+            if most > _speed(best, dwell):
+                best = max(best, at(scale, 1.0), key=lambda f: _speed(f, dwell))
         if best is None or np.all(best.durations <= least):
             return best if best is None else replace(best, durations=demands.durations(best.moves, least))
     scale = _largest(lambda scale: speed(scale, best_share(scale)), np.linspace(1.0, 0.2, TRIED))

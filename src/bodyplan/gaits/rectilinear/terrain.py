@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, excess, lay, room_for
 from bodyplan.ground.steps import steps_clearance
@@ -113,28 +113,58 @@ def into_ground(
     count = len(pose.anchors)
     slack, none = STANDS * keeps.size + met * keeps.size, met * keeps.size
     first, last = (0, 2 * count) if only < 0 else (max(0, 2 * only - 1), min(2 * count, 2 * only + 3))
+    if only > 0 and first == 0:
+        first = 1
+    if 0 <= only < count - 1:
+        last = min(last, 2 * count - 1)
+    left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
+    for k in range(first, min(last + 1, 2 * count)):
+        x, z = pose.origins[k, 0], pose.origins[k, 1]
+        left, right, low, high = min(left, x), max(right, x), min(low, z), max(high, z)
+    if last == 2 * count:
+        right = max(right, pose.origins[last - 1, 0] + keeps.head)
+    reach = keeps.body + max(keeps.margin, keeps.low)
+    ground = highest(steps.floor_x, steps.floor_z, left - reach, right + reach)
+    edge = np.searchsorted(steps.corners[:, 0], left - reach, side="left")
+    edges = edge < len(steps.corners) and steps.corners[edge, 0] <= right + reach
     floor = ceiling = False
-    for i in range(count):
-        if only < 0 or i == only:
-            segment[0, 0], segment[0, 1] = pose.anchors[i], pose.anchors[i]
-            floor = floor or _near(steps.floor_x, steps.floor_z, segment, keeps.rest, slack, gap)
+    # where no step is near the floor is level under all of the body
+    clear = not edges and low - ground >= max(keeps.rest, keeps.body) - slack
+    if not clear:
+        for i in range(count):
+            if not floor and (only < 0 or i == only):
+                segment[0, 0], segment[0, 1] = pose.anchors[i], pose.anchors[i]
+                floor = _near(steps.floor_x, steps.floor_z, segment, keeps.rest, slack, gap)
+    above = keeps.top + keeps.margin
+    roof = highest(steps.roof_x, steps.roof_z, left - above, right + above)
     for k in range(first, last):
-        if (k == 0 and only > 0) or (k == 2 * count - 1 and 0 <= only < count - 1):
-            continue
-        segment[0, 0] = pose.origins[k]
-        if k < 2 * count - 1:
-            segment[0, 1] = pose.origins[k + 1]
-        else:
-            segment[0, 1, 0], segment[0, 1, 1] = pose.origins[k, 0] + keeps.head, pose.origins[k, 1]
-        more = keeps.low if k == 0 or k == 2 * count - 1 else keeps.margin
-        floor = floor or _near(steps.floor_x, steps.floor_z, segment, keeps.body, slack, gap)
-        floor = floor or _at_corner(steps, segment, keeps.body + more, none)
-        # links keep from the ceiling what the joints must: those are where it is nearest
-        segment[:, :, 1] *= -1.0
-        ceiling = ceiling or _near(steps.roof_x, steps.roof_z, segment, keeps.top + keeps.margin, none, gap)
-        if floor and ceiling:
+        if clear or floor:
             break
+        _link(keeps, pose, k, segment)
+        if min(segment[0, 0, 1], segment[0, 1, 1]) - ground >= reach:
+            continue
+        more = keeps.low if k == 0 or k == 2 * count - 1 else keeps.margin
+        floor = _near(steps.floor_x, steps.floor_z, segment, keeps.body, slack, gap)
+        floor = floor or _at_corner(steps, segment, keeps.body + more, none)
+    for k in range(first, last):
+        if ceiling or high + roof <= -above:
+            break
+        # links keep from the ceiling what the joints must: those are where it is nearest
+        _link(keeps, pose, k, segment)
+        segment[0, 0, 1], segment[0, 1, 1] = -segment[0, 0, 1], -segment[0, 1, 1]
+        if min(segment[0, 0, 1], segment[0, 1, 1]) - roof < above:
+            ceiling = _near(steps.roof_x, steps.roof_z, segment, above, none, gap)
     return floor, ceiling
+
+
+@njit(cache=True)
+def _link(keeps: Keeps, pose: Pose, k: int, segment: Array) -> None:
+    """Both ends of link ``k`` into ``segment`` (1, 2, 2); 0 is the tail link, the last the head link."""
+    segment[0, 0] = pose.origins[k]
+    if k < len(pose.origins) - 1:
+        segment[0, 1] = pose.origins[k + 1]
+    else:
+        segment[0, 1, 0], segment[0, 1, 1] = pose.origins[k, 0] + keeps.head, pose.origins[k, 1]
 
 
 @njit(cache=True)
@@ -174,7 +204,7 @@ def try_move(
     enough = np.inf if every else met
     first = -1
     out[:] = False
-    pose.fresh[0] = True
+    pose.fresh[:] = True
     for p in range(len(places)):
         lay(bounds, before, after, lift, early, m, places[p], pose)
         excess(bounds, swinging, pose, enough, found)
@@ -225,68 +255,3 @@ def try_moves(
         try_move(
             bounds, steps, keeps, before, after, lift, early, swinging[m], m, places, only, met, every, pose, out[m]
         )
-
-
-@njit(cache=True)
-def rise(steps: Steps, keeps: Keeps, start: Array, end: Array, tail: bool, head: bool) -> float:
-    """How far m the floor under the way of an anchor from ``start`` (2,) to ``end``, its ``tail`` or ``head`` link
-    included, stands above the higher of them."""
-    low = min(start[0], end[0]) - (keeps.tail if tail else 0.0)
-    high = max(start[0], end[0]) + (keeps.head if head else 0.0)
-    top, out = max(start[1], end[1]) - keeps.rest, 0.0
-    for at in steps.breaks:
-        if low <= at <= high:
-            out = max(out, highest(steps.floor_x, steps.floor_z, at, at) - top)
-    return out
-
-
-@njit(cache=True)
-def land(
-    bounds: Bounds,
-    steps: Steps,
-    keeps: Keeps,
-    anchors: Array,
-    i: int,
-    spots: Array,
-    shapes: Array,
-    places: Array,
-    met: float,
-    out: Array,
-    which: IntArray,
-) -> None:
-    """For anchor ``i`` of ``anchors`` (N, 2) and each of ``spots`` (K, 2): the first of ``shapes`` (k, 2) in which it
-    gets there, as ``which`` (K,) and its lift and ``early`` in ``out`` (K, 2); -1 where it cannot stand there, -2 where
-    no shape goes. Over level ground no other shape than the first can help, and none is lower."""
-    count = len(anchors)
-    before, after = anchors.copy().reshape(1, count, 2), anchors.copy().reshape(1, count, 2)
-    lift, early, swinging = np.zeros((1, count)), np.ones((1, count)), np.zeros(count, dtype=np.bool_)
-    pose, found, here = room_for(bounds), np.empty(len(TRIED), dtype=np.bool_), np.zeros(1)
-    order = places.copy()
-    for k in range(len(spots)):
-        after[0, i], before[0, i] = spots[k], spots[k]
-        lift[0, i], early[0, i], swinging[i] = 0.0, 1.0, False
-        which[k] = -1
-        if (
-            try_move(bounds, steps, keeps, before, after, lift, early, swinging, 0, here, i, met, False, pose, found)
-            >= 0
-        ):
-            continue
-        before[0, i] = anchors[i]
-        swinging[i] = True
-        above = rise(steps, keeps, anchors[i], spots[k], i == 0, i == count - 1)
-        level = spots[k, 1] == anchors[i, 1] and above <= 0.0
-        which[k] = -2
-        for s in range(1 if level else len(shapes)):
-            lift[0, i], early[0, i] = keeps.lift + shapes[s, 0] * (above + keeps.margin), shapes[s, 1]
-            swinging[i] = lift[0, i] > 0.0
-            bad = try_move(
-                bounds, steps, keeps, before, after, lift, early, swinging, 0, order, i, met, False, pose, found
-            )
-            if bad < 0:
-                which[k], out[k, 0], out[k, 1] = s, lift[0, i], early[0, i]
-                break
-            # what was in the way here is likely to be in the way of the next
-            worst = order[bad]
-            for p in range(bad, 0, -1):
-                order[p] = order[p - 1]
-            order[0] = worst

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import MET, Demands
+from bodyplan.gaits.rectilinear.landing import Offer, choose, land
 from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.snake import InchingSnake
-from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, land, try_moves
+from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, try_moves
 from bodyplan.gaits.rectilinear.track import Track
 
 #: landing spots tried between standing and reach, and rounds that close in on the farthest good one with a few more
 SPOTS, CLOSER, ROUNDS = 20, 4, 2
 #: where among the spots that go those lie that are offered beside the farthest
 SHARES = (0.8, 0.55, 0.3, 0.0)
-#: places along a move at which it is tried, and those at which one that is kept is tried again
-PLACES, CLOSE = 25, 121
+#: places along a move at which it is tried
+PLACES = 25
 #: shapes of a swing: what is added to its lift, in units of how far the ground on its way stands above its ends, and
 #: how early it rises
 SHAPES = ((0.0, 1.0), (0.0, 0.7), (0.0, 0.5), (0.0, 0.3), (1.0, 1.0), (1.0, 0.6), (1.6, 1.0), (1.6, 0.4))
@@ -29,6 +30,9 @@ SHAPES = ((0.0, 1.0), (0.0, 0.7), (0.0, 0.5), (0.0, 0.3), (1.0, 1.0), (1.0, 0.6)
 OVER_EDGES = 0.9
 #: shares of a straight leg by which an anchor may be behind the place beyond an edge where the next one lands
 BRIDGES = (0.985, 0.95, 0.9)
+
+#: share of its margin by which the body may come nearer to edges between the places at which a move is tried
+NEARER = 0.02
 
 #: a place to land: where (2,) m, lift m and how early the swing rises
 Spot = tuple[Array, float, float]
@@ -53,14 +57,22 @@ class Walker:
 
     @cached_property
     def keeps(self) -> Keeps:
-        """What the body keeps from the ground."""
+        """What the body keeps from the ground at the places at which moves are tried."""
+        return self._keeps(self.margin)
+
+    @cached_property
+    def least(self) -> Keeps:
+        """What it keeps between them."""
+        return self._keeps(self.margin * (1.0 - NEARER))
+
+    def _keeps(self, margin: float) -> Keeps:
         snake = self.snake
         return Keeps(
             float(snake.rest),
             float(snake.body),
-            float(self.margin),
+            float(margin),
             # tail and head links lie as low as the feet and may hang over an edge
-            min(float(self.margin), OVER_EDGES * max(float(snake.rest - snake.body), 0.0)),
+            min(float(margin), OVER_EDGES * max(float(snake.rest - snake.body), 0.0)),
             float(snake.top),
             float(snake.tail),
             float(snake.head),
@@ -82,16 +94,18 @@ class Walker:
             found[:, TRIED.index(Status.ABOVE_CEILING)] |= found[:, told[-1]]
         return [next((TRIED[k] for k in np.flatnonzero(row)), Status.OK) for row in found]
 
-    def sound(self, moves: Moves) -> BoolArray:
-        """(M,) True for the moves that run into nothing at many places, with the whole body."""
-        return np.asarray(~self._into(moves, _CLOSE, None, False).any(axis=1))
+    def sound(self, moves: Moves, places: int, between: bool = False) -> BoolArray:
+        """(M,) True for the moves that run into nothing at so many ``places``, with the whole body; ``between``: where
+        most of them lie between those at which the moves have been tried."""
+        return np.asarray(~self._into(moves, _halved(places), None, False, between).any(axis=1))
 
-    def _into(self, moves: Moves, places: Array, only: int | None, every: bool) -> BoolArray:
+    def _into(self, moves: Moves, places: Array, only: int | None, every: bool, between: bool = False) -> BoolArray:
         """(M, 9): what each move runs into, all of it with ``every``, else the first thing that is found."""
+        keeps = self.least if between else self.keeps
         out = np.empty((len(moves), len(TRIED)), dtype=bool)
         who = -1 if only is None else int(only)
         try_moves(
-            self.demands.bounds, self.track.steps, self.keeps, *moves.tables, moves.swinging, places, who, MET, every,
+            self.demands.bounds, self.track.steps, keeps, *moves.tables, moves.swinging, places, who, MET, every,
             out,
         )  # fmt: skip
         return out
@@ -107,8 +121,8 @@ class Walker:
     def _land(self, here: Array, i: int, spots: Array) -> tuple[IntArray, Array]:
         which, made = np.empty(len(spots), dtype=np.int64), np.zeros((len(spots), 2))
         land(
-            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _SHAPES, _ORDER,
-            MET, made, which,
+            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _OFFER, MET, made,
+            which,
         )  # fmt: skip
         return which, made
 
@@ -141,26 +155,19 @@ class Walker:
 
     def options(self, here: Array, i: int) -> list[Spot]:
         """Where anchor ``i`` of ``here`` (N, 2) may land, with the lift and shape of its swing, the farthest first."""
-        at = self._spots(here, i)
+        at = np.sort(self._spots(here, i))
         if not len(at):
             return []
-        roomy = self._roomy(here, i, at)
-        found = self._landings(here, i, at[roomy])
-        if not found:
-            found = self._landings(here, i, at[~roomy])
-        if not found:
-            return []
-        # closer to the farthest that goes than the grid: what is lost here is lost in every cycle
-        far, step = self._reach(here, i), (self._reach(here, i) - here[i, 0]) / SPOTS
-        for _ in range(ROUNDS):
-            tried = found[-1][0][0] + step * np.arange(1, CLOSER + 1) / (CLOSER + 1)
-            inside = (tried < far) & self._roomy(here, i, tried)
-            found += self._landings(here, i, tried[inside])
-            step /= CLOSER + 1
-        last, edges = len(found) - 1, self._beside_edges[i]
-        chosen = {last, *(round(share * last) for share in SHARES)}
-        chosen |= {m for m, spot in enumerate(found) if np.any(np.abs(edges - spot[0][0]) < 1e-12)}
-        return [found[m] for m in sorted(chosen, reverse=True)]
+        far, low, high = self._reach(here, i), *self._room(here, i)
+        roomy = (at >= low) & (at <= high)
+        found = np.zeros((0, 4))
+        for places in (at[roomy], at[~roomy]):
+            if len(places) and not len(found):
+                found = choose(
+                    self.demands.bounds, self.track.steps, self.keeps, here, i, places, self._beside_edges[i],
+                    (low, high), far, (far - here[i, 0]) / SPOTS, _OFFER, MET,
+                )  # fmt: skip
+        return [(spot[:2], float(spot[2]), float(spot[3])) for spot in found]
 
     def _spots(self, here: Array, i: int) -> Array:
         """Places (K,) m where anchor ``i`` might land."""
@@ -169,23 +176,15 @@ class Walker:
         even = at + (far - at) * np.arange(1, SPOTS + 1) / SPOTS if far > at else np.zeros(0)
         return np.concatenate([even, edges[(edges > at) & (edges < far)]])
 
-    def _landings(self, here: Array, i: int, at: Array) -> list[Spot]:
-        """The spots ``at`` (K,) m on which anchor ``i`` can land, with lift and shape, the farthest last."""
-        if not len(at):
-            return []
-        spots = self.stand(np.sort(at))
-        which, made = self._land(here, i, spots)
-        return [(spots[k], float(made[k, 0]), float(made[k, 1])) for k in np.flatnonzero(which >= 0)]
-
-    def _roomy(self, here: Array, i: int, at: Array) -> BoolArray:
-        """(K,) True where anchor ``i`` at ``at`` (K,) m makes no leg of ``here`` too short for the next move."""
-        out = np.ones(len(at), dtype=bool)
+    def _room(self, here: Array, i: int) -> tuple[float, float]:
+        """m from where and up to where anchor ``i`` makes no leg of ``here`` too short for the next move."""
+        low, high = -np.inf, np.inf
         if self.short is not None:
             if i > 0:
-                out &= at - here[i - 1, 0] >= self.short[i - 1] * (1.0 - 1e-9)
+                low = here[i - 1, 0] + self.short[i - 1] * (1.0 - 1e-9)
             if i < len(here) - 1:
-                out &= here[i + 1, 0] - at >= self.short[i] * (1.0 - 1e-9)
-        return out
+                high = here[i + 1, 0] - self.short[i] * (1.0 - 1e-9)
+        return float(low), float(high)
 
     def _reach(self, here: Array, i: int) -> float:
         """m: what anchor ``i`` cannot pass: the reach of the leg behind it, and the anchor ahead."""
@@ -214,10 +213,11 @@ class Walker:
         return out
 
 
+@cache
 def _halved(count: int) -> Array:
     """``count`` places from 0 to 1, coarse ones first and 0 last: what a move runs into shows early."""
     turned = [int(f"{k:032b}"[::-1], 2) if k else 1 << 32 for k in range(count)]
     return np.linspace(0.0, 1.0, count)[np.argsort(turned, kind="stable")]
 
 
-_SHAPES, _ORDER, _CLOSE = np.array(SHAPES), _halved(PLACES), _halved(CLOSE)
+_OFFER = Offer(np.array(SHAPES), _halved(PLACES), CLOSER, ROUNDS, np.array(SHARES))
