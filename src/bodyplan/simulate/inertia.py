@@ -14,6 +14,11 @@ from bodyplan.robot.masses import RIM_HALF_WIDTH, centre_of, centroid, middle, v
 
 #: density of water, kg/m^3: gives a rod or a bare motor a thickness where nothing else says
 WATER = 1000.0
+#: what an inertia may lack to be that of a body: a part of itself, for the digits of a file, and of m L^2 of a robot of
+#: length L, for points without extent
+ROUNDED, POINT = 1e-5, 1e-9
+#: kg m^2: principal moments that MuJoCo takes for none
+NONE = 1e-14
 
 
 class Inertial(NamedTuple):
@@ -44,6 +49,33 @@ def inertial(body: Body, contacts: Sequence[Contact], previous: ArrayLike) -> In
         xx, yy, zz, xy, xz, yz = body.inertia
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return Inertial(body.mass, com, inertia)
+
+
+def sound(whole: Inertial, length: float) -> Inertial | None:
+    """An inertia that a body can have: principal moments > 0, none above the sum of the others. One that lacks that by
+    rounding, or has no extent, gets as much more about every axis; None where it lacks more. ``length`` m of the robot.
+    """
+    A, B, C = np.linalg.eigvalsh(whole.inertia)
+    lacking = max(C - A - B, 2.0 * NONE - A)
+    if lacking <= 0.0:
+        return whole
+    if lacking > max(ROUNDED * C, POINT * whole.mass * length**2, 2.0 * NONE):
+        return None
+    more = lacking + 1e-9 * abs(C) + NONE
+    return whole._replace(inertia=whole.inertia + more * np.eye(3))
+
+
+def joined(parts: Sequence[Inertial]) -> Inertial:
+    """The inertia of parts that are one rigid body, all in one frame."""
+    mass = sum(part.mass for part in parts)
+    com = np.asarray(sum((part.mass * part.com for part in parts), np.zeros(3)) / mass)
+    inertia = sum((part.inertia + part.mass * _offset(part.com - com) for part in parts), np.zeros((3, 3)))
+    return Inertial(mass, com, np.asarray(inertia))
+
+
+def moved(whole: Inertial, at: Array, turn: Array) -> Inertial:
+    """The same seen from another frame, in which this one is at ``at`` (3,) m, turned by the matrix ``turn`` (3, 3)."""
+    return Inertial(whole.mass, at + turn @ whole.com, turn @ whole.inertia @ turn.T)
 
 
 def axis_of(contact: Contact) -> tuple[Array, float]:

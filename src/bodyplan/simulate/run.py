@@ -84,7 +84,9 @@ def simulate(
     if not isinstance(motion, Motion):
         raise InputError(f"motion: expected a Motion, got {motion!r}.")
     if not motion.robot.contacts:
-        raise InputError(f"robot {motion.robot.name!r}: has no contacts; it could only fall.")
+        raise InputError(
+            f"robot {motion.robot.name!r}: has no contacts; it could only fall. Give it some: a file's meshes are none."
+        )
     cycles = whole(cycles, "cycles", at_least=1, at_most=100_000)
     reference = Reference.of(motion)
     cycles = cycles if reference.period is not None else 1

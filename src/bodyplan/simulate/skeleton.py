@@ -20,11 +20,11 @@ from bodyplan.errors import InputError
 from bodyplan.robot.elements import Arc, Body, Contact, Joint, Row, Variable
 from bodyplan.robot.masses import RIM_HALF_WIDTH, previous_origins
 from bodyplan.robot.model import Robot
-from bodyplan.simulate.inertia import Inertial, axis_of, inertial
+from bodyplan.simulate.inertia import Inertial, axis_of, inertial, joined, moved, sound
 from bodyplan.simulate.library import mujoco
 from bodyplan.simulate.rims import RING_SHARE, Ring, given_up, lightened, pointers_of, rims_of, ring_of
 from bodyplan.simulate.wheels import TIPS, add_motor, add_ring
-from bodyplan.spatial.rotations import conjugate, multiply, quaternion_exp, rotate
+from bodyplan.spatial.rotations import conjugate, matrix_from_quaternion, multiply, quaternion_exp, rotate
 
 X, Y, Z = np.eye(3)
 #: mass of a moving frame that carries none, over the robot's mass: MuJoCo needs a positive number, and
@@ -71,7 +71,10 @@ class _Builder:
         rest = robot.forward(np.zeros(robot.n))
         self.rest = {name: rest[name] for name in robot.frames}
         self.previous = dict(zip(robot.frames, previous_origins(robot), strict=True))
-        size = float(np.max(np.linalg.norm(rest.positions, axis=-1), initial=0.0))
+        size = self.size = float(np.max(np.linalg.norm(rest.positions, axis=-1), initial=0.0))
+        # what moves -> frames that are fixed to it, itself included, and what they carry
+        self.leader: dict[str, str] = {}
+        self.carried: dict[str, dict[str, Inertial]] = {}
         speck = max(SPECK * robot.mass, 1e-14)
         self.speck = Inertial(speck, np.zeros(3), max(speck * size**2, 1e-14) * np.eye(3))
         self.uses = self._count_uses()
@@ -90,7 +93,7 @@ class _Builder:
 
     def build(self) -> Drives:
         base = self._body(self.spec.worldbody, "base", np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), [], free=True)
-        self._furnish(base, "base", self.robot.base_body, moves=True)
+        self._furnish(base, "base", "base", self.robot.base_body, moves=True)
         for chain in self.robot.chains:
             parent = chain.parent
             for i, element in enumerate(chain.elements):
@@ -100,6 +103,8 @@ class _Builder:
                 elif frame not in self.pointers:
                     self._add_row(element, frame, parent)
                 parent = frame
+        for leader, parts in self.carried.items():
+            self._give(leader, parts)
         for ring in self.rings:
             self._add_wheel(ring)
         names, joints, scales = zip(*self.made, strict=True) if self.made else ((), (), ())
@@ -130,7 +135,7 @@ class _Builder:
             if isinstance(value := getattr(row, field), Joint)
         ]
         body = self._body(self.bodies[parent], frame, place, turn, hinges)
-        self._furnish(body, frame, row.body, moves=bool(hinges))
+        self._furnish(body, frame, parent, row.body, moves=bool(hinges))
 
     def _add_arc(self, arc: Arc, frame: str, parent: str) -> None:
         """An arc as k equal pieces that bend at their middles: the chord of a piece of angle 2y is too long
@@ -143,9 +148,9 @@ class _Builder:
             body = self._body(
                 self.bodies[parent], frame, rotate(back, there[:3] - here[:3]), multiply(back, there[3:]), []
             )
-            self._furnish(body, frame, arc.body, moves=False)
+            self._furnish(body, frame, parent, arc.body, moves=False)
             return
-        body = self.bodies[parent]
+        body, before = self.bodies[parent], parent
         k, piece = self.arc_joints, arc.length / self.arc_joints
         angles = {f: _rest(getattr(arc, f)) / k for f in arc.VARIABLES}
         axes = {"pitch": Y, "yaw": Z}
@@ -166,7 +171,7 @@ class _Builder:
             body = self._body(body, name, start + rotate(turn, out), turn, hinges)
             if not last:
                 self._mass(body, self.speck)
-        self._furnish(body, frame, arc.body, moves=True)
+        self._furnish(body, frame, before, arc.body, moves=True)
 
     def _add_wheel(self, ring: Ring) -> None:
         column = self.robot.joint_index(ring.joint)
@@ -204,7 +209,8 @@ class _Builder:
             self.made.append((name, self.robot.joints.index(joint.name), joint.scale))
         return body
 
-    def _furnish(self, body: Any, frame: str, carried: Body | None, *, moves: bool) -> None:
+    def _furnish(self, body: Any, frame: str, parent: str, carried: Body | None, *, moves: bool) -> None:
+        leader = self.leader[frame] = frame if moves else self.leader.get(parent, parent)
         body.add_site(name=frame, size=[0.002] * 3, group=4)
         shapes = self.contacts.get(frame, [])
         for contact in shapes:
@@ -212,9 +218,37 @@ class _Builder:
                 self._shape(body, contact)
         if carried is not None:
             whole = inertial(carried, shapes, self.previous[frame])
-            self._mass(body, lightened(whole, self.given[frame]) if frame in self.given else whole)
+            whole = lightened(whole, self.given[frame]) if frame in self.given else whole
+            self.carried.setdefault(leader, {})[frame] = whole
         elif moves:
             self._mass(body, self.speck)
+
+    def _give(self, leader: str, parts: Mapping[str, Inertial]) -> None:
+        """Their masses to frames that are fixed to each other. Where one is no body by itself (files give sensors of
+        no extent, or any number, to links that are fixed to others), all go to the frame that moves them: the same
+        motion."""
+        given = {frame: sound(part, self.size) for frame, part in parts.items()}
+        if all(part is not None for part in given.values()):
+            for frame, part in given.items():
+                assert part is not None
+                self._mass(self.bodies[frame], part)
+            return
+        here = self.rest[leader]
+        back = conjugate(here[3:])
+        seen = []
+        for frame, part in parts.items():
+            there = self.rest[frame]
+            turn = matrix_from_quaternion(multiply(back, there[3:]))
+            seen.append(moved(part, rotate(back, there[:3] - here[:3]), turn))
+        together = joined(seen)
+        whole = sound(together, self.size)
+        if whole is None:
+            moments = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(together.inertia))
+            raise InputError(
+                f"robot {self.robot.name!r} cannot be simulated: the inertia of {', '.join(parts)} is that of no body. "
+                f"Its principal moments are {moments} kg m^2; all must be > 0, none above the sum of the two others."
+            )
+        self._mass(self.bodies[leader], whole)
 
     @staticmethod
     def _mass(body: Any, inertial: Inertial) -> None:
