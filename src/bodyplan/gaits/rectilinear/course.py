@@ -48,7 +48,7 @@ def course_of(gait: Rectilinear, snake: InchingSnake, track: Track, until: float
     least = least_time(gait, demands)
     if not track.level and gait.drive == "fastest":
         return _over_steps(gait, snake, track, demands, until, least)
-    found = _stride(gait, snake.robot, room)
+    found = _stride(_standard(gait), snake.robot, room)
     if track.level:
         if found is not None and found.status == Status.OK:
             return _repeated(found, snake, track, gait)
@@ -62,6 +62,15 @@ def least_time(gait: Rectilinear, demands: Demands) -> float:
     if gait.move_time is not None:
         return gait.move_time
     return 1e-3 if len(demands.rates) and np.isfinite(demands.rates).all() else MOVE_TIME
+
+
+def _standard(gait: Rectilinear) -> Rectilinear:
+    """The gait without what does not matter to its stride on level ground."""
+    options = gait.to_dict() | {"heading": 0.0, "start": (0.0, 0.0), "cycles": None, "clearance": None}
+    if gait.drive == "fastest":
+        del options["share"]
+    del options["kind"]
+    return type(gait)(**options)
 
 
 @lru_cache(maxsize=16)
@@ -235,20 +244,20 @@ def _over_steps(
 
 
 def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: float) -> tuple[Way, int]:
-    """The best way that a narrow search finds at a good pace, or else a wide one at any; and how many stances were
-    tried. Where neither goes on under a ceiling the snake comes to low places stretched."""
+    """The way that a narrow search finds at a good pace, or else a wide one at any; and how many stances were tried.
+    Where neither goes on under a ceiling the snake comes to low places stretched."""
     walkers = [walker]
     if np.isfinite(walker.track.steps.roof_z).any():
         walkers.append(replace(walker, crouch=float(walker.demands.straight.max())))
     tried, begin = 0, float(start[:, 0].mean())
     ways: list[Way] = []
-    for breadth in (NARROW, WIDE):
+    for breadth in (*NARROW, WIDE):
         ways = []
         for each in walkers:
             way = search(each, start, schedule, wanted, pace, breadth)
             tried += way.tried
             slow = way.far - begin < BRISK * wanted * pace
-            if way.status == Status.OK and not (slow and breadth is NARROW):
+            if way.status == Status.OK and not (slow and breadth is not WIDE):
                 return way, tried
             ways.append(way)
     return max(ways, key=lambda w: (w.status == Status.OK, w.far)), tried

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from dataclasses import dataclass
-from itertools import count
+from dataclasses import dataclass, replace
+from itertools import count, pairwise
 
 import numpy as np
 
@@ -44,8 +44,12 @@ class Breadth:
     stuck: int
 
 
-#: a few stances that differ much find most ways; where they do not, many that differ little decide
-NARROW, WIDE = Breadth(8, 0.4, 300), Breadth(16, 0.1, 900)
+#: a few stances that differ much find most ways, one such choice of them where another does not; where none does, many
+#: that differ little decide
+NARROW = (Breadth(8, 0.4, 200), Breadth(8, 0.5, 200), Breadth(12, 0.3, 300))
+WIDE = Breadth(16, 0.1, 500)
+#: how much higher a swing is made that comes too near to something between the places at which moves are tried
+HIGHER = (1.02, 1.05, 1.1, 1.2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +120,10 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
         best = ahead
         done = sorted((s for s in batch if s.made >= most), key=lambda s: -s.far)
         for state in done:
-            bad = _flaw(walker, state)
-            if bad is None:
-                return _way(state, Status.OK, "", expanded)
-            wrong.add(bad)
+            line = _mended(walker, state)
+            if line[-1].made >= most:
+                return _way(line, Status.OK, "", expanded)
+            wrong.add(_line(state)[len(line)])
         batch = [s for s in batch if s.made < most]
         for state in [s for b in batch for s in _next(walker, b, groups[phase], names[phase], len(groups))]:
             stance = (state.phase, *np.round(state.anchors[:, 0] / (breadth.alike * link)).astype(int).tolist())
@@ -130,10 +134,8 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
                 heapq.heappush(
                     heaps[state.phase], (WEIGHT * state.made + HELD * state.held - gone, next(counter), state)
                 )
-    bad = _flaw(walker, best)
-    while bad is not None and bad.before is not None:
-        best = bad.before
-        bad = _flaw(walker, best)
+    line = _mended(walker, best)
+    best = line[-1]
     why: Why = Counter()
     for group, name in zip(groups, names, strict=True):
         for i in group:
@@ -143,13 +145,13 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
     told = sorted(why.most_common(), key=lambda item: (item[0][1] not in ground, item[0][1] == reach))
     name, status = told[0][0] if told else (names[0], Status.OUT_OF_REACH)
     at = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.anchors[:, 0])} m"
-    return _way(best, status, f"No landing spot leads on {at}: {name}: {status}", expanded)
+    return _way(line, status, f"No landing spot leads on {at}: {name}: {status}", expanded)
 
 
-def _way(state: _State, status: Status, reason: str, tried: int) -> Way:
-    made = [s for s in _line(state) if s.move is not None]
-    cycles = [s.before.cycle for s in made if s.before is not None]
-    return Way([s.move for s in made if s.move is not None], np.array(cycles, dtype=np.int64), status, reason, tried)
+def _way(line: list[_State], status: Status, reason: str, tried: int) -> Way:
+    moves = [s.move for s in line if s.move is not None]
+    cycles = [before.cycle for before, s in pairwise(line) if s.move is not None]
+    return Way(moves, np.array(cycles, dtype=np.int64), status, reason, tried)
 
 
 def _line(state: _State) -> list[_State]:
@@ -160,14 +162,23 @@ def _line(state: _State) -> list[_State]:
     return out[::-1]
 
 
-def _flaw(walker: Walker, state: _State) -> _State | None:
-    """The first state on the way to this one whose move runs into something between the places at which moves are
-    tried at first."""
-    made = [s for s in _line(state) if s.move is not None]
-    if not made:
-        return None
-    sound = walker.sound(Moves.joined([s.move for s in made if s.move is not None]), FINAL, True)
-    return next((s for s, good in zip(made, sound, strict=True) if not good), None)
+def _mended(walker: Walker, state: _State) -> list[_State]:
+    """The states that lead to this one, as far as their moves run into nothing between the places at which moves are
+    tried at first either; swings that do are made higher where that helps."""
+    line = _line(state)
+    moving = [k for k, s in enumerate(line) if s.move is not None]
+    if not moving:
+        return line
+    sound = walker.sound(Moves.joined([m for s in line if (m := s.move) is not None]), FINAL, True)
+    for k in (k for k, good in zip(moving, sound, strict=True) if not good):
+        move = line[k].move
+        assert move is not None
+        more = Moves.joined([replace(move, lift=move.lift * share) for share in HIGHER])
+        good = np.flatnonzero(walker.sound(more, FINAL, True))
+        if not len(good):
+            return line[:k]
+        line[k] = replace(line[k], move=replace(move, lift=move.lift * HIGHER[good[0]]))
+    return line
 
 
 def _sound(walker: Walker, states: list[_State]) -> list[_State]:
