@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from time import monotonic
@@ -20,8 +20,8 @@ from bodyplan.search.measures import Bound
 from bodyplan.search.payload import Payload
 from bodyplan.search.point import Row, evaluate
 
-#: points under way for each worker: enough that none waits for the next one
-AHEAD = 3
+#: points under way for each worker: enough that none waits for the next one while a batch of them travels
+AHEAD = 8
 #: s: how often to look whether workers have come or gone
 NEWS = 1.0
 #: s: how long a cluster may take to answer and to have a worker
@@ -31,8 +31,13 @@ MOST_WORKERS = 512
 #: environment of workers on this machine: a point in each of them, not a point in all
 ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 LOST = "its process ended, also when it was the only point (stopped by the system, for want of memory perhaps)"
-#: a worker has one point at a time, so that the one that ends it takes no other one with it
-DEALING = {"distributed.scheduler.worker-saturation": 1.0, "distributed.scheduler.allowed-failures": 1}
+#: a worker has the next point beside the one that it works out, so that it never waits for a message; no samples are
+#: taken of what it does
+DEALING = {
+    "distributed.scheduler.worker-saturation": 2.0,
+    "distributed.scheduler.allowed-failures": 1,
+    "distributed.worker.profile.enabled": False,
+}
 #: a point to work out: its key and what is changed in the mission
 Job = tuple[str, Sequence[str]]
 
@@ -75,52 +80,52 @@ class Pool:
         if payload.files:
             sent = self._client.submit(replace, payload, key=f"bodyplan-mission-{payload.content}")
         waiting = iter(jobs.items())
-        done = distributed_().as_completed()
+        done = distributed_().as_completed(with_results=True, raise_errors=False)
         keys: dict[Any, str] = {}
 
-        def give() -> bool:
-            job = next(waiting, None)
-            if job is not None:
-                key, overrides = job
-                name = f"bodyplan-point-{key}{again}"
-                future = self._client.submit(on_worker, __version__, sent, overrides, *how, key=name)
-                keys[future] = key
-                done.add(future)
-            return job is not None
+        def give(most: int) -> None:
+            """Send up to so many points, all in one message: a message costs more than a point in it."""
+            batch = dict(itertools.islice(waiting, most))
+            if batch:
+                names = [f"bodyplan-point-{key}{again}" for key in batch]
+                arguments = [(__version__, sent, overrides, *how) for overrides in batch.values()]
+                futures = self._client.map(on_worker, *map(list, zip(*arguments, strict=True)), key=names)
+                keys.update(zip(futures, batch, strict=True))
+                done.update(futures)
 
         try:
             room, asked = self._room(), monotonic()
-            while len(keys) < max(1, room) and give():
-                pass
-            for future in done:
-                yield keys.pop(future), _row_of(future)
+            give(room)
+            for found in done.batches():
                 if monotonic() - asked > NEWS:
                     room, asked = self._room(), monotonic()
-                while len(keys) < max(1, room) and give():
-                    pass
+                if len(keys) - len(found) <= room // 2:
+                    give(room - (len(keys) - len(found)))
+                for future, result in found:
+                    yield keys.pop(future), _row_of(future, result)
         finally:
             self._client.cancel(list(keys))
 
     def _room(self) -> int:
         """Points that may be under way with the workers that there are now."""
-        return AHEAD * len(self._client.scheduler_info(-1)["workers"])
+        return AHEAD * max(1, len(self._client.scheduler_info(-1)["workers"]))
 
 
-def _row_of(future: Any) -> Row:
-    try:
-        row: Row = future.result()
-    except distributed_().KilledWorker:
+def _row_of(future: Any, result: Any) -> Row:
+    if future.status == "finished":
+        row: Row = result
+        return row
+    if future.status != "error":
+        raise BodyplanError("the cluster has gone; what is finished is kept, and the same command goes on.")
+    error = result[1]
+    if isinstance(error, distributed_().KilledWorker):
         return Row("lost", LOST)
-    except CancelledError as error:
-        raise BodyplanError("the cluster has gone; what is finished is kept, and the same command goes on.") from error
-    except BodyplanError:
-        raise
-    except Exception as error:
-        raise BodyplanError(
-            f"the workers cannot run bodyplan ({type(error).__name__}: {error}); they need the same bodyplan and "
-            "Python as this process."
-        ) from error
-    return row
+    if isinstance(error, BodyplanError):
+        raise error
+    raise BodyplanError(
+        f"the workers cannot run bodyplan ({type(error).__name__}: {error}); they need the same bodyplan and Python as "
+        "this process."
+    ) from error
 
 
 def on_worker(
