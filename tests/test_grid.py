@@ -55,6 +55,19 @@ def worked():
 # --- the grid
 
 
+def test_points_of_the_physics_share_a_plan_until_a_file_of_the_mission_changes(tmp_path):
+    """The text says the same, what is planned does not."""
+    file = tmp_path / "robot.toml"
+    snake = 'kind = "snake"\nlinks = 8\nlink_length = "100 mm"'
+    assert snake in MISSION
+    text = MISSION.replace(snake, f'kind = "file"\npath = "{file.as_posix()}"')
+    for links in (8, 10):
+        bp.snake(links, 0.1).to_toml(file)
+        one, other = (job._plan_of(alone(text, "m", (f"simulate.friction={mu}",))) for mu in (0.1, 0.2))
+        assert one is other and one.robot.n == links - 1
+        assert one == job.plan_mission(alone(text, "m"))
+
+
 def test_every_point_is_what_the_mission_gives_alone(worked):
     outcome, said = worked
     assert [(p.mission, p.value, p.status) for p in outcome.grid.points] == [("m", 0.05, "ok"), ("m", 0.3, "ok")]

@@ -21,11 +21,14 @@ from bodyplan.arrays import Array
 from bodyplan.check import check
 from bodyplan.errors import BodyplanError, InputError, MissingExtraError
 from bodyplan.files import refuse_existing, refuse_folder, replacing_folder
+from bodyplan.gaits.base import Gait
+from bodyplan.ground.base import Ground
 from bodyplan.metrics import Metrics, metrics_of
 from bodyplan.missions import Mission, load_mission
 from bodyplan.missions.files import alone, model_section, ready_missions
 from bodyplan.motion import Motion
 from bodyplan.plan import MOST_SAMPLES, plan
+from bodyplan.robot.model import Robot
 from bodyplan.show.beside import Beside, beside, check_facts, check_units
 from bodyplan.show.outcome import Comparison, Grid, GridPoint, Outcome, Variant, figures_of, no_slip_ratio
 
@@ -78,9 +81,13 @@ def _bounded(samples: float) -> None:
 
 def plan_mission(mission: Mission) -> Motion:
     """The mission's motion."""
+    _one_length(mission)
+    return plan(mission.robot, mission.gait, mission.ground, mission_times(mission))
+
+
+def _one_length(mission: Mission) -> None:
     if mission.time.stop is not None and mission.time.cycles is not None:
         raise InputError("time: give cycles or stop, not both.")
-    return plan(mission.robot, mission.gait, mission.ground, mission_times(mission))
 
 
 def simulate_mission(mission: Mission, motion: Motion, progress: Callable[[float], None] | None = None) -> Any:
@@ -132,7 +139,7 @@ def grid_point(text: str, name: str, key: str, value: float) -> GridPoint:
     try:
         mission = alone(text, name, (f"{key}={value!r}",))
         # a field of the physics leaves the plan as it is
-        motion = _plan_of(text, name) if model_section(key) == "simulate" else plan_mission(mission)
+        motion = _plan_of(mission) if model_section(key) == "simulate" else plan_mission(mission)
         if not motion.ok:
             first = int(np.flatnonzero(motion.status != "ok")[0])
             return GridPoint(name, value, str(motion.status[first]), f"the plan, at t = {motion.t[first]:.4g} s")
@@ -159,9 +166,16 @@ def grid_point(text: str, name: str, key: str, value: float) -> GridPoint:
     )
 
 
+def _plan_of(mission: Mission) -> Motion:
+    """:func:`plan_mission`, once for missions that differ in their physics alone: known by what is planned and not by
+    the text, which may name files that have changed since."""
+    _one_length(mission)
+    return _plan_at(mission.robot, mission.gait, mission.ground, mission_times(mission).tobytes())
+
+
 @lru_cache(maxsize=8)
-def _plan_of(text: str, name: str) -> Motion:
-    return plan_mission(alone(text, name))
+def _plan_at(robot: Robot, gait: Gait, ground: Ground, t: bytes) -> Motion:
+    return plan(robot, gait, ground, np.frombuffer(t))
 
 
 def _begun(pool: ProcessPoolExecutor, job: tuple[Any, ...]) -> Callable[[], Any]:
