@@ -197,6 +197,17 @@ def test_the_command_line_says_what_is_wrong(tmp_path):
     assert run.exit_code == 2 and "concertina" in run.output
 
 
+def test_ctrl_c_ends_a_search_with_a_word(monkeypatch):
+    def stopped(*arguments, progress, **options):
+        progress(1, 2)
+        raise KeyboardInterrupt
+
+    for name, option in (("sweep", "--over"), ("optimise", "--vary")):
+        monkeypatch.setattr(f"bodyplan.search.{name}", stopped)
+        run = CliRunner().invoke(app, [name, "concertina", option, "gait.omega=1:2"])
+        assert run.exit_code == 130 and "the same command goes on" in run.output
+
+
 # --- measures, bounds, rows
 
 

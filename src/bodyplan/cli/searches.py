@@ -45,22 +45,19 @@ def sweep(
     with bad_input():
         from bodyplan.search import sweep as do
 
-        try:
-            with points_bar() as progress:
-                made = do(
-                    mission,
-                    over,
-                    out,
-                    metrics=metric or (),
-                    overrides=set_ or (),
-                    simulate=simulate,
-                    workers=workers,
-                    scheduler=scheduler,
-                    force=force,
-                    progress=progress,
-                )
-        except KeyboardInterrupt:
-            _stopped()
+        with stoppable() as progress:
+            made = do(
+                mission,
+                over,
+                out,
+                metrics=metric or (),
+                overrides=set_ or (),
+                simulate=simulate,
+                workers=workers,
+                scheduler=scheduler,
+                force=force,
+                progress=progress,
+            )
         _swept(made)
 
 
@@ -97,35 +94,38 @@ def optimise(
     with bad_input():
         from bodyplan.search import optimise as do
 
-        try:
-            with points_bar() as progress:
-                made = do(
-                    mission,
-                    vary,
-                    maximise=maximise or (),
-                    minimise=minimise or (),
-                    subject_to=subject_to or (),
-                    trials=trials,
-                    out=out,
-                    storage=storage,
-                    sampler=sampler,
-                    seed=seed,
-                    batch=batch,
-                    overrides=set_ or (),
-                    simulate=simulate,
-                    workers=workers,
-                    scheduler=scheduler,
-                    force=force,
-                    progress=progress,
-                )
-        except KeyboardInterrupt:
-            _stopped()
+        with stoppable() as progress:
+            made = do(
+                mission,
+                vary,
+                maximise=maximise or (),
+                minimise=minimise or (),
+                subject_to=subject_to or (),
+                trials=trials,
+                out=out,
+                storage=storage,
+                sampler=sampler,
+                seed=seed,
+                batch=batch,
+                overrides=set_ or (),
+                simulate=simulate,
+                workers=workers,
+                scheduler=scheduler,
+                force=force,
+                progress=progress,
+            )
         _optimised(made)
 
 
-def _stopped() -> None:
-    typer.echo("stopped; finished points are kept and in the table, the same command goes on", err=True)
-    raise typer.Exit(130)
+@contextmanager
+def stoppable() -> Iterator[Callable[[int, int], None]]:
+    """The bar of a search that ctrl-C ends with a word."""
+    try:
+        with points_bar() as progress:
+            yield progress
+    except KeyboardInterrupt:
+        typer.echo("stopped; finished points are kept and in the table, the same command goes on", err=True)
+        raise typer.Exit(130) from None
 
 
 @contextmanager

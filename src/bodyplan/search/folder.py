@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +32,11 @@ WRITTEN = (
     "study.db-wal",
     "study.db-shm",
 )
+
+
+def folder_of(out: str | os.PathLike[str] | None, kind: str, name: str) -> Path:
+    """``out``, or the folder that a search of that kind gets where nobody says: ``runs/<kind>-<name>``."""
+    return Path(out) if out is not None else Path("runs") / f"{kind}-{name}"
 
 
 def settings_of(simulate: bool, bounds: Sequence[Bound] | None = None) -> dict[str, Any]:

@@ -14,14 +14,14 @@ from typing import Any
 
 from bodyplan.errors import InputError
 from bodyplan.files import replacing
-from bodyplan.missions import Mission, load_mission
+from bodyplan.missions import Mission
 from bodyplan.missions.files import alone
 from bodyplan.search.cluster import pool
 from bodyplan.search.fields import check_fields, labelled, value_of, whole_fields
-from bodyplan.search.folder import BEST, PAGE, asked_of, opened, settings_of, write_tables
+from bodyplan.search.folder import BEST, PAGE, asked_of, folder_of, opened, settings_of, write_tables
 from bodyplan.search.measures import Bound, Measure, bound_of, measures_of
 from bodyplan.search.parameters import Range, axes_of, ranges_of
-from bodyplan.search.payload import key_of, payload_of
+from bodyplan.search.payload import begun, key_of
 from bodyplan.search.point import Row
 from bodyplan.search.studies import Objective, Study, Trial, feasible, quiet, sampler_named
 from bodyplan.search.sweeps import Progress, known, silent
@@ -128,13 +128,8 @@ def optimise(
     ``seed`` and ``batch``, not on the workers. The rest as :func:`bodyplan.sweep`; the same call goes on where it was
     stopped, and one with more ``trials`` adds to them.
     """
-    if not isinstance(mission, Mission):
-        mission = load_mission(mission, tuple(overrides))
-    elif overrides:
-        raise InputError("overrides: give them to load_mission.")
+    mission, payload, simulate = begun(mission, overrides, simulate)
     _numbers(trials, seed, batch)
-    payload = payload_of(mission)
-    simulate = simulate and mission.simulate is not None
     data = tomllib.loads(payload.text)
     vary = dict(vary) if isinstance(vary, Mapping) else [vary] if isinstance(vary, str) else list(vary)
     names = [str(item).partition("=")[0].strip() for item in vary]
@@ -150,7 +145,7 @@ def optimise(
     settings = settings_of(simulate, first)
     chosen = sampler_named(sampler, objectives, ranges)
     total = -(-trials // batch) * batch
-    folder = Path(out) if out is not None else Path("runs") / f"optimise-{mission.name}"
+    folder = folder_of(out, "optimise", mission.name)
     asked = asked_of(
         "optimise",
         payload,

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bodyplan.errors import InputError
-from bodyplan.missions import Mission
+from bodyplan.missions import Mission, load_mission
 from bodyplan.missions.files import alone
 from bodyplan.robot.files import toml_value
 
@@ -41,6 +41,15 @@ class Payload:
     def mission(self, overrides: Sequence[str] = ()) -> Mission:
         """The mission with ``overrides`` on this machine; raises as :func:`bodyplan.load_mission`."""
         return alone(unpacked(self), self.name, overrides)
+
+
+def begun(mission: Mission | str | Path, overrides: Sequence[str], simulate: bool) -> tuple[Mission, Payload, bool]:
+    """What every search begins with: the mission, as data too, and whether its points are executed."""
+    if not isinstance(mission, Mission):
+        mission = load_mission(mission, tuple(overrides))
+    elif overrides:
+        raise InputError("overrides: give them to load_mission.")
+    return mission, payload_of(mission), simulate and mission.simulate is not None
 
 
 def payload_of(mission: Mission) -> Payload:

@@ -17,13 +17,13 @@ from bodyplan.arrays import Array
 from bodyplan.errors import InputError, UnknownNameError
 from bodyplan.files import replacing
 from bodyplan.job import plan_mission
-from bodyplan.missions import Mission, load_mission
+from bodyplan.missions import Mission
 from bodyplan.search.cluster import Job, pool
 from bodyplan.search.fields import check_fields, labelled
-from bodyplan.search.folder import PAGE, asked_of, opened, settings_of, write_tables
+from bodyplan.search.folder import PAGE, asked_of, folder_of, opened, settings_of, write_tables
 from bodyplan.search.measures import Measure, measures_of
 from bodyplan.search.parameters import Axis, axes_of
-from bodyplan.search.payload import key_of, payload_of
+from bodyplan.search.payload import begun, key_of
 from bodyplan.search.point import Row
 from bodyplan.search.table import Table, table_of
 
@@ -123,21 +123,16 @@ def sweep(
     A point that fails is a row with its status and reason. Rows do not depend on the workers, their number or their
     order. Raises InputError for bad input; KeyboardInterrupt leaves the table of what is finished.
     """
-    if not isinstance(mission, Mission):
-        mission = load_mission(mission, tuple(overrides))
-    elif overrides:
-        raise InputError("overrides: give them to load_mission.")
+    mission, payload, simulate = begun(mission, overrides, simulate)
     axes = axes_of(over)
     total = _bounded(axes)
-    payload = payload_of(mission)
-    simulate = simulate and mission.simulate is not None
     settings = settings_of(simulate)
     points = _points(axes)
     check_fields(
         payload, {axis.key: axis.values for axis in axes}, (point.overrides for point in points), simulate, "--over"
     )
     measures = chosen_measures(mission, metrics, simulate)
-    folder = Path(out) if out is not None else Path("runs") / f"sweep-{mission.name}"
+    folder = folder_of(out, "sweep", mission.name)
     asked = asked_of(
         "sweep", payload, simulate, over={axis.key: [value.shown for value in axis.values] for axis in axes}
     )
