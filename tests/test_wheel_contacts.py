@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import bodyplan as bp
-from bodyplan.gaits.carry import pose, pose_of
+from bodyplan.gaits.carry import pose, pose_of, search
+from bodyplan.gaits.carry.planes import Planes
 from wheel_cases import nearest_by_brute_force, paper_system, rotation
 
 ROBOT = bp.tri_wheel()
@@ -264,3 +265,21 @@ def test_refusals(make, words) -> None:  # type: ignore[no-untyped-def]
         make()
     for word in words:
         assert word in str(raised.value)
+
+
+def test_search_on_a_height_map_is_that_of_any_ground() -> None:
+    """Wheel by wheel in the kernel, or all at once over any ground: the same contacts, the same proofs."""
+    rng = np.random.default_rng(3)
+    ground = bp.HeightMap(0.03 * rng.normal(size=(41, 41)), 0.1, (-2.0, -2.0))
+    count = 60
+    level = ground.height(place := rng.uniform(-1.2, 1.2, (count, 2)))
+    centre = np.concatenate([place, (level + rng.uniform(0.1, 0.3, count))[:, None]], axis=1)
+    turns = [rotation(*(rng.normal(size=3) * [0.2 * (i % 2), 0.2 * (i % 2), 2.0])) for i in range(count)]
+    planes = Planes.of(centre, np.array([R[:, 0] for R in turns]), np.array([R[:, 1] for R in turns]))
+    guess = rng.uniform(-0.05, 0.05, count)
+    quick, plain = search.nearest(ground, planes, guess), search._Search(ground, planes, guess).run()
+    np.testing.assert_array_equal(quick.certified, plain.certified)
+    assert quick.certified.mean() > 0.8
+    sure = quick.certified
+    np.testing.assert_allclose(quick.distance[sure], plain.distance[sure], rtol=1e-12)
+    np.testing.assert_allclose(quick.s[sure], plain.s[sure], atol=1e-9)

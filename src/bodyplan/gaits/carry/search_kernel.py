@@ -42,6 +42,8 @@ class Land(NamedTuple):
 F, GX, GY, HXX, HXY, HYY, W, FIRST, SECOND, STEEP, FOUND, COLUMNS = range(12)
 #: notes of minima kept for one wheel
 _NOTES = 64
+#: cells to begin with: what is wider than these hardly ever decides
+_FIRST = 8
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -162,11 +164,13 @@ def _minimum(
 ) -> tuple[float, bool]:
     """The one minimum of Phi between a and b, and whether there is one inside: Newton on Phi', kept by bisection."""
     section_at(land, centre, ahead, up, upright, a, basis, at)
-    if a + at[W] * at[FIRST] >= 0.0:
-        return a, False
+    slope = a + at[W] * at[FIRST]
+    if slope >= 0.0:
+        return a, slope == 0.0
     section_at(land, centre, ahead, up, upright, b, basis, at)
-    if b + at[W] * at[FIRST] <= 0.0:
-        return b, False
+    slope = b + at[W] * at[FIRST]
+    if slope <= 0.0:
+        return b, slope == 0.0
     s = 0.5 * (a + b)
     for _ in range(60):
         section_at(land, centre, ahead, up, upright, s, basis, at)
@@ -218,8 +222,11 @@ def search(
             if at[FOUND] != 0.0 and distance < nearest:
                 place, nearest = start, distance
         size = max(abs(c[0]), abs(c[1]), abs(c[2]))
-        count, done = 1, math.isfinite(nearest)
-        cells[0, 0], cells[0, 1] = -nearest * (1.0 + twice), nearest * (1.0 + twice)
+        count, done = _FIRST, math.isfinite(nearest)
+        reach = nearest * (1.0 + twice)
+        for i in range(_FIRST):
+            cells[i, 0] = (2.0 * i / _FIRST - 1.0) * reach
+            cells[i, 1] = (2.0 * (i + 1) / _FIRST - 1.0) * reach
         for _ in range(levels):
             if count == 0 or not done:
                 break

@@ -80,7 +80,7 @@ def least_factor(A: Array, b: Array, family: Family, start: Start | None = None)
     """
     k, nothing = len(family.slope), np.zeros(len(b))
     if start is not None:
-        done = polish_ratio(A, b, family, *start, steps=WARM)
+        done = polish_ratio(A, b, family, *start)
         if _proved(A, family, done):
             return Factor(done.s, done.x, done.y, family.touching)
     normal = along_normals(A, b)
