@@ -109,14 +109,14 @@ def lay(bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, 
         x, z, short = chord_of(pose.start, pose.offset, i, (a + b) ** 2)
         pose.short[i], pose.square[i] = short, x * x + z * z
         along, up = elbow(a, b, x, z, short)
-        origins[rear] = anchors[i]
+        origins[rear, 0], origins[rear, 1] = anchors[i, 0], anchors[i, 1]
         origins[rear + 1, 0], origins[rear + 1, 1] = anchors[i, 0] + along, anchors[i, 1] + up
         turn[rear, 0], turn[rear, 1] = along / a, up / a
         turn[rear + 1, 0], turn[rear + 1, 1] = (x - along) / b, (z - up) / b
         if bounds.limited:
             pose.angles[rear], pose.angles[rear + 1], _, _ = leg_angles(a, b, x, z, short)
     origins[0, 0], origins[0, 1] = anchors[0, 0] - bounds.tail, anchors[0, 1]
-    origins[2 * count - 1] = anchors[count - 1]
+    origins[2 * count - 1, 0], origins[2 * count - 1, 1] = anchors[count - 1, 0], anchors[count - 1, 1]
     pose.fresh[0] = False
 
 

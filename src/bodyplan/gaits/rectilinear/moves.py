@@ -75,7 +75,7 @@ def swing_of(
         dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]
         near = before if tau < 0.5 else after
         start[i, 0], start[i, 1] = near[m, i, 0], near[m, i, 1]
-        offset[i] = 0.0
+        offset[i, 0] = offset[i, 1] = 0.0
         if dx != 0.0 or dz != 0.0 or lift[m, i] != 0.0:
             risen_x, risen_z, left_x, left_z = swung(tau, dx, dz, lift[m, i], early[m, i])
             offset[i, 0] = risen_x if tau < 0.5 else left_x

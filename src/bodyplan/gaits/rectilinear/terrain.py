@@ -10,7 +10,6 @@ from numba import njit
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, excess, lay, room_for
-from bodyplan.ground.steps import steps_clearance
 
 #: relative slack of a foot that stands
 STANDS = 1e-12
@@ -20,13 +19,12 @@ FLOOR, CEILING = len(DEMANDS), len(DEMANDS) + 1
 
 
 class Steps(NamedTuple):
-    """A ground in steps along the way, for kernels: ``floor_x`` (k,) and ``floor_z`` (k + 1,) m, its edges ``corners``
-    (k, 2); ``roof_x``, ``roof_z`` the ceiling upside down (-inf where it is open); ``breaks`` (e,) m of all steps and
-    the ``height`` (e + 1,) m between floor and ceiling before, between and beyond them."""
+    """A ground in steps along the way, for kernels: ``floor_x`` (k,) and levels ``floor_z`` (k + 1,) m; ``roof_x``,
+    ``roof_z`` the ceiling upside down (-inf where it is open); ``breaks`` (e,) m of all steps and the ``height``
+    (e + 1,) m between floor and ceiling before, between and beyond them."""
 
     floor_x: Array
     floor_z: Array
-    corners: Array
     roof_x: Array
     roof_z: Array
     breaks: Array
@@ -73,41 +71,60 @@ def room_above(steps: Steps, low: float, high: float) -> float:
 
 
 @njit(cache=True)
-def _near(xs: Array, zs: Array, segment: Array, need: float, slack: float, gap: Array) -> bool:
-    """Whether a ``segment`` (1, 2, 2) is nearer to a floor than ``need`` m by more than ``slack``."""
-    x0, x1 = min(segment[0, 0, 0], segment[0, 1, 0]), max(segment[0, 0, 0], segment[0, 1, 0])
-    reach = max(need, 0.0)
-    if min(segment[0, 0, 1], segment[0, 1, 1]) - highest(xs, zs, x0 - reach, x1 + reach) >= need - slack:
-        return False
-    gap[0] = np.inf
-    steps_clearance(segment, xs, zs, gap)
-    return bool(need - gap[0] > slack)
-
-
-@njit(cache=True)
-def _at_corner(steps: Steps, segment: Array, need: float, slack: float) -> bool:
-    """Whether a ``segment`` is nearer to an edge of the floor than ``need`` m by more than ``slack``."""
-    (x0, z0), (x1, z1) = segment[0]
-    low = np.searchsorted(steps.corners[:, 0], min(x0, x1) - need, side="left")
-    for k in range(low, len(steps.corners)):
-        x, z = steps.corners[k]
-        if x > max(x0, x1) + need:
-            break
-        if z < min(z0, z1) - need:
-            continue
-        dx, dz = x1 - x0, z1 - z0
-        square = dx * dx + dz * dz
-        share = ((x - x0) * dx + (z - z0) * dz) / square if square > 0.0 else 0.0
-        share = min(max(share, 0.0), 1.0)
-        if need - np.hypot(x - x0 - share * dx, z - z0 - share * dz) > slack:
+def nearer(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float, least: float) -> bool:
+    """Whether a segment, along and up, is nearer than ``least`` m to a floor with steps at ``xs`` (k,) and levels
+    ``zs`` (k + 1,), or below it: straight down to a tread, straight across to a face, or to an edge."""
+    if x0 > x1:
+        x0, z0, x1, z1 = x1, z1, x0, z0
+    low, high, reach = min(z0, z1), max(z0, z1), max(least, 0.0)
+    first, last = np.searchsorted(xs, x0 - reach, side="left"), np.searchsorted(xs, x1 + reach, side="right")
+    for i in range(first, last + 1):
+        a = max(x0, xs[i - 1]) if i > 0 else x0
+        b = min(x1, xs[i]) if i < len(xs) else x1
+        if a <= b and low - zs[i] < least:
+            za, zb = z0, z1
+            if x1 > x0:
+                za, zb = z0 + (a - x0) / (x1 - x0) * (z1 - z0), z0 + (b - x0) / (x1 - x0) * (z1 - z0)
+            if min(za, zb) - zs[i] < least:
+                return True
+    for i in range(first, last):
+        foot, edge = min(zs[i], zs[i + 1]), max(zs[i], zs[i + 1])
+        a, b = max(low, foot), min(high, edge)
+        if a <= b:
+            xa, xb = x0 - xs[i], x1 - xs[i]
+            if high > low:
+                xa, xb = x0 + (a - z0) / (z1 - z0) * (x1 - x0) - xs[i], x0 + (b - z0) / (z1 - z0) * (x1 - x0) - xs[i]
+            if (0.0 if xa * xb <= 0.0 else min(abs(xa), abs(xb))) < least:
+                return True
+        if low - edge < least and _distance(x0, z0, x1, z1, xs[i], edge) < least:
             return True
     return False
 
 
 @njit(cache=True)
-def into_ground(
-    steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float, segment: Array, gap: Array
-) -> tuple[bool, bool]:
+def _distance(x0: float, z0: float, x1: float, z1: float, x: float, z: float) -> float:
+    """Of a point (x, z) from a segment, m."""
+    dx, dz = x1 - x0, z1 - z0
+    square = dx * dx + dz * dz
+    share = ((x - x0) * dx + (z - z0) * dz) / square if square > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return float(np.hypot(x - x0 - share * dx, z - z0 - share * dz))
+
+
+@njit(cache=True)
+def _at_corner(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float, need: float, slack: float) -> bool:
+    """Whether a segment is nearer to an edge of a floor than ``need`` m by more than ``slack``."""
+    for k in range(np.searchsorted(xs, min(x0, x1) - need, side="left"), len(xs)):
+        if xs[k] > max(x0, x1) + need:
+            break
+        edge = max(zs[k], zs[k + 1])
+        if edge >= min(z0, z1) - need and need - _distance(x0, z0, x1, z1, xs[k], edge) > slack:
+            return True
+    return False
+
+
+@njit(cache=True)
+def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -> tuple[bool, bool]:
     """Whether a pose reaches into the floor or its edges, and into the ceiling. ``only``: the one anchor with whose
     legs, tail or head link that may be (-1: all)."""
     count = len(pose.anchors)
@@ -118,53 +135,36 @@ def into_ground(
     if 0 <= only < count - 1:
         last = min(last, 2 * count - 1)
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
+    origins, floor_x, floor_z = pose.origins, steps.floor_x, steps.floor_z
     for k in range(first, min(last + 1, 2 * count)):
-        x, z = pose.origins[k, 0], pose.origins[k, 1]
+        x, z = origins[k, 0], origins[k, 1]
         left, right, low, high = min(left, x), max(right, x), min(low, z), max(high, z)
     if last == 2 * count:
-        right = max(right, pose.origins[last - 1, 0] + keeps.head)
-    reach = keeps.body + max(keeps.margin, keeps.low)
-    ground = highest(steps.floor_x, steps.floor_z, left - reach, right + reach)
-    edge = np.searchsorted(steps.corners[:, 0], left - reach, side="left")
-    edges = edge < len(steps.corners) and steps.corners[edge, 0] <= right + reach
+        right = max(right, origins[last - 1, 0] + keeps.head)
+    reach, above = keeps.body + max(keeps.margin, keeps.low), keeps.top + keeps.margin
+    ground = highest(floor_x, floor_z, left - reach, right + reach)
+    roof = highest(steps.roof_x, steps.roof_z, left - above, right + above)
+    edge = np.searchsorted(floor_x, left - reach, side="left")
+    edges = edge < len(floor_x) and floor_x[edge] <= right + reach
     floor = ceiling = False
     # where no step is near the floor is level under all of the body
     clear = not edges and low - ground >= max(keeps.rest, keeps.body) - slack
     if not clear:
         for i in range(count):
             if not floor and (only < 0 or i == only):
-                segment[0, 0], segment[0, 1] = pose.anchors[i], pose.anchors[i]
-                floor = _near(steps.floor_x, steps.floor_z, segment, keeps.rest, slack, gap)
-    above = keeps.top + keeps.margin
-    roof = highest(steps.roof_x, steps.roof_z, left - above, right + above)
+                x, z = pose.anchors[i, 0], pose.anchors[i, 1]
+                floor = nearer(floor_x, floor_z, x, z, x, z, keeps.rest - slack)
     for k in range(first, last):
-        if clear or floor:
-            break
-        _link(keeps, pose, k, segment)
-        if min(segment[0, 0, 1], segment[0, 1, 1]) - ground >= reach:
-            continue
-        more = keeps.low if k == 0 or k == 2 * count - 1 else keeps.margin
-        floor = _near(steps.floor_x, steps.floor_z, segment, keeps.body, slack, gap)
-        floor = floor or _at_corner(steps, segment, keeps.body + more, none)
-    for k in range(first, last):
-        if ceiling or high + roof <= -above:
-            break
+        x0, z0 = origins[k, 0], origins[k, 1]
+        x1, z1 = (origins[k + 1, 0], origins[k + 1, 1]) if k < 2 * count - 1 else (x0 + keeps.head, z0)
+        if not (clear or floor) and min(z0, z1) - ground < reach:
+            more = keeps.low if k == 0 or k == 2 * count - 1 else keeps.margin
+            floor = nearer(floor_x, floor_z, x0, z0, x1, z1, keeps.body - slack)
+            floor = floor or _at_corner(floor_x, floor_z, x0, z0, x1, z1, keeps.body + more, none)
         # links keep from the ceiling what the joints must: those are where it is nearest
-        _link(keeps, pose, k, segment)
-        segment[0, 0, 1], segment[0, 1, 1] = -segment[0, 0, 1], -segment[0, 1, 1]
-        if min(segment[0, 0, 1], segment[0, 1, 1]) - roof < above:
-            ceiling = _near(steps.roof_x, steps.roof_z, segment, above, none, gap)
+        if not ceiling and max(z0, z1) + roof > -above:
+            ceiling = nearer(steps.roof_x, steps.roof_z, x0, -z0, x1, -z1, above - none)
     return floor, ceiling
-
-
-@njit(cache=True)
-def _link(keeps: Keeps, pose: Pose, k: int, segment: Array) -> None:
-    """Both ends of link ``k`` into ``segment`` (1, 2, 2); 0 is the tail link, the last the head link."""
-    segment[0, 0] = pose.origins[k]
-    if k < len(pose.origins) - 1:
-        segment[0, 1] = pose.origins[k + 1]
-    else:
-        segment[0, 1, 0], segment[0, 1, 1] = pose.origins[k, 0] + keeps.head, pose.origins[k, 1]
 
 
 @njit(cache=True)
@@ -200,7 +200,7 @@ def try_move(
     """What of :data:`TRIED` move ``m`` runs into at ``places`` (p,) of tau, into ``out`` (9,), and the place where the
     first was found, -1 where none is. ``every``: all of it, the ground only where the demands are met; or else the
     first thing that is found."""
-    found, segment, gap = np.empty(len(DEMANDS)), np.empty((1, 2, 2)), np.empty(1)
+    found = np.empty(len(DEMANDS))
     enough = np.inf if every else met
     first = -1
     out[:] = False
@@ -213,7 +213,7 @@ def try_move(
             if found[d] > met:
                 out[d] = bad = True
         if not bad and not every:
-            out[FLOOR], out[CEILING] = into_ground(steps, keeps, pose, only, met, segment, gap)
+            out[FLOOR], out[CEILING] = into_ground(steps, keeps, pose, only, met)
             bad = out[FLOOR] or out[CEILING]
         if not np.isnan(keeps.crouch):
             low = _crouched(steps, keeps, pose, before[m])
@@ -228,7 +228,7 @@ def try_move(
     if every and not out[: len(DEMANDS)].any():
         for p in range(len(places)):
             lay(bounds, before, after, lift, early, m, places[p], pose)
-            floor, ceiling = into_ground(steps, keeps, pose, only, met, segment, gap)
+            floor, ceiling = into_ground(steps, keeps, pose, only, met)
             out[FLOOR], out[CEILING] = out[FLOOR] or floor, out[CEILING] or ceiling
     return first
 

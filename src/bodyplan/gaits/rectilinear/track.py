@@ -24,7 +24,7 @@ class Track:
     """``ground`` along the way from ``origin`` (2,) m in direction ``heading`` rad; s m is the distance on it.
 
     ``level``: the same everywhere, with ``floor`` and ``ceiling`` m. For steps these hold where the way begins;
-    ``breaks`` (e,) m are the s of all steps, ``corners`` (k, 2) m the edges of the floor's, along and up.
+    ``breaks`` (e,) m are the s of all steps.
     """
 
     ground: Ground
@@ -34,7 +34,6 @@ class Track:
     floor: float
     ceiling: float
     breaks: Array = field(default_factory=lambda: np.zeros(0))
-    corners: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @classmethod
     def of(cls, ground: Ground, origin: tuple[float, float], heading: float) -> Track:
@@ -54,9 +53,7 @@ class Track:
             raise InputError(
                 f"Rectilinear: heading must be 0 on a profile with steps, which run across x; got {heading:.4g} rad."
             )
-        floor_x, floor_z = ground.floor_levels
-        corners = np.stack([floor_x - origin[0], np.maximum(floor_z[:-1], floor_z[1:])], axis=-1)
-        return cls(ground, origin, heading, False, floor, ceiling, np.asarray(ground.breaks) - origin[0], corners)
+        return cls(ground, origin, heading, False, floor, ceiling, np.asarray(ground.breaks) - origin[0])
 
     @property
     def along(self) -> Array:
@@ -87,7 +84,7 @@ class Track:
         """Floor and ceiling for kernels; of a level ground those at its place."""
         if not isinstance(self.ground, Profile):
             none, inf = np.zeros(0), np.full(1, np.inf)
-            return Steps(none, np.array([self.floor]), np.zeros((0, 2)), none, -inf, none, inf)
+            return Steps(none, np.array([self.floor]), none, -inf, none, inf)
         floor_x, floor_z = self.ground.floor_levels
         roof_x, roof_z = self.ground.ceiling_levels
         starts, ends = np.append(-np.inf, self.breaks), np.append(self.breaks, np.inf)
@@ -96,7 +93,6 @@ class Track:
         return Steps(
             floor_x - self.origin[0],
             np.array(floor_z),
-            np.ascontiguousarray(self.corners),
             roof_x - self.origin[0],
             -np.asarray(roof_z),
             np.array(self.breaks),
