@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
+from bodyplan.ground.near import clearance_up_to
 
 #: rings and directions of a search for footholds
 RINGS, DIRECTIONS = 8, 24
@@ -16,32 +20,71 @@ AROUND = 12
 EXACT, HOLLOW, SETTLES = 1e-10, 1e-2, 20
 
 
-def footholds(ground: Ground, nominal: Array, radius: float, max_slope: float, search: float) -> tuple[Array, str]:
-    """Centres (k, 3) m, the best first, of balls of ``radius`` m on ground no steeper than ``max_slope`` rad at
-    ``nominal`` (2,) m or as near to it as can be within ``search`` m; and why there is none (one ball is at ``nominal``
-    then, if it can).
+@dataclass(frozen=True, eq=False)
+class Footholds:
+    """Where a ball of ``radius`` m can stand on ``ground`` no steeper than ``max_slope`` rad, at ``nominal`` (2,) m or
+    as near to it as can be within ``search`` m.
 
     A search prefers footholds with room for the ball at its sides and ground all around it: no riser or edge within a
     radius."""
-    tried = nominal[None]
-    if search > 0.0:
-        rings = search * np.arange(1, RINGS + 1) / RINGS
-        tried = np.concatenate([tried, nominal + (rings[:, None, None] * _ways(DIRECTIONS)).reshape(-1, 2)])
-    there = _on(ground, tried)
-    if not there.any():
-        return np.array([[*nominal, radius]]), "no ground " + _where(search)
-    tried = tried[there]
-    normals = ground.normal(tried)
-    centres, stands = _settled(ground, tried, normals, radius)
-    flat = np.arccos(np.clip(normals[:, 2], -1.0, 1.0)) <= max_slope + EXACT
-    good = np.flatnonzero(stands & flat)
-    if not len(good):
-        steep = f"the ground is steeper than {np.degrees(max_slope):.3g} deg, or an edge, {_where(search)}"
-        return centres[:1], steep + ("" if search > 0.0 else '; foothold = "search" looks around')
-    if search > 0.0:
-        roomy = _roomy(ground, centres[good], radius, max_slope)
-        good = np.concatenate([good[roomy], good[~roomy]])
-    return centres[good], ""
+
+    ground: Ground
+    nominal: Array
+    radius: float
+    max_slope: float
+    search: float
+
+    @cached_property
+    def first(self) -> tuple[Array, str]:
+        """The best centre (3,) m; and why there is none (where it would be at ``nominal`` then, if it can)."""
+        good: list[Array] = []
+        steep: list[Array] = []
+        # nearer ones come first, and most often the first of all will do
+        for tried in np.split(self._tried, [1, 1 + DIRECTIONS]):
+            centres, stands, roomy = self._judged(tried)
+            if roomy.any():
+                return centres[roomy.argmax()], ""
+            good += [centres[stands][:1]]
+            steep += [centres[:1]]
+        for found, why in ((np.concatenate(good), ""), (np.concatenate(steep), self._steep)):
+            if len(found):
+                return found[0], why
+        return np.array([*self.nominal, self.radius]), f"no ground {_where(self.search)}"
+
+    @cached_property
+    def all(self) -> Array:
+        """All centres (k, 3) m, the best first."""
+        centres, stands, roomy = self._judged(self._tried)
+        return np.concatenate([centres[roomy], centres[stands & ~roomy]])
+
+    @property
+    def _tried(self) -> Array:
+        """(k, 2) m, from the middle outwards."""
+        if not self.search > 0.0:
+            return self.nominal[None]
+        rings = self.search * np.arange(1, RINGS + 1) / RINGS
+        around = (rings[:, None, None] * _ways(DIRECTIONS)).reshape(-1, 2)
+        return np.concatenate([self.nominal[None], self.nominal + around])
+
+    @property
+    def _steep(self) -> str:
+        why = f"the ground is steeper than {np.degrees(self.max_slope):.3g} deg, or an edge, {_where(self.search)}"
+        return why + ("" if self.search > 0.0 else '; foothold = "search" looks around')
+
+    def _judged(self, tried: Array) -> tuple[Array, BoolArray, BoolArray]:
+        """Centres (k, 3) m of balls at those of ``tried`` (n, 2) that have ground below them, which of these can stand,
+        and which have room there (all, without a search)."""
+        tried = tried[_on(self.ground, tried)] if len(tried) else tried
+        if not len(tried):
+            return np.zeros((0, 3)), np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+        normals = self.ground.normal(tried)
+        centres, stands = _settled(self.ground, tried, normals, self.radius)
+        flat = np.arccos(np.clip(normals[:, 2], -1.0, 1.0)) <= self.max_slope + EXACT
+        good = stands & flat
+        roomy = good.copy()
+        if self.search > 0.0 and good.any():
+            roomy[good] = _roomy(self.ground, centres[good], self.radius, self.max_slope)
+        return centres, good, roomy
 
 
 def _where(search: float) -> str:
@@ -68,22 +111,22 @@ def _settled(ground: Ground, points: Array, normals: Array, radius: float) -> tu
     """Centres (k, 3) of balls on the ground at ``points`` (k, 2), and which of them touch nothing else: a ball in a
     hollow that is hardly narrower than itself is moved out of it."""
     begun = np.concatenate([points, ground.height(points)[:, None]], axis=1) + radius * normals
-    centres, gap = begun.copy(), _gap(ground, begun, radius)
+    centres, gap = begun.copy(), _gap(ground, begun, radius, 0.0)
     for _ in range(SETTLES):
         inside = np.flatnonzero((gap < -EXACT) & (gap > -HOLLOW * radius))
         if not len(inside):
             break
         centres[inside] -= gap[inside, None] * normals[inside]
-        gap[inside] = _gap(ground, centres[inside], radius)
+        gap[inside] = _gap(ground, centres[inside], radius, 0.0)
     moved = np.linalg.norm(centres - begun, axis=1)
     return centres, (gap >= -EXACT) & (moved <= 2.0 * HOLLOW * radius)
 
 
-def _gap(ground: Ground, centres: Array, radius: float) -> Array:
-    """Clearance (k,) m of balls; minus infinity beyond the edge of the ground."""
+def _gap(ground: Ground, centres: Array, radius: float, most: float) -> Array:
+    """Clearance (k,) m of balls, up to ``most`` m; minus infinity beyond the edge of the ground."""
     there = _on(ground, centres[:, :2])
     out = np.full(len(centres), -np.inf)
-    out[there] = ground.clearance(centres[there]) - radius
+    out[there] = clearance_up_to(ground, centres[there], radius + most) - radius
     return out
 
 
@@ -91,7 +134,7 @@ def _roomy(ground: Ground, centres: Array, radius: float, max_slope: float) -> B
     """Which of balls at ``centres`` (k, 3) can rise with a radius of room at their sides, and have ground around them
     that is nowhere far below."""
     above = centres + 2.0 * radius * np.array([0.0, 0.0, 1.0])
-    room = _gap(ground, above, radius) >= radius * (1.0 - 1e-3)
+    room = _gap(ground, above, radius, radius) >= radius * (1.0 - 1e-3)
     around = centres[:, None, :2] + radius * _ways(AROUND)
     there = _on(ground, around.reshape(-1, 2)).reshape(around.shape[:2])
     depth = np.full(there.shape, np.inf)

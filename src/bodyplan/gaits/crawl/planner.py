@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status
-from bodyplan.gaits.crawl.footholds import footholds
+from bodyplan.gaits.crawl.footholds import Footholds
 from bodyplan.gaits.crawl.legs import Legs, stance_guess
 from bodyplan.gaits.crawl.shell import Shell, shell_of
 from bodyplan.gaits.crawl.steps import Course, Step, blend, clear_swing, clear_swings, swing_path
@@ -114,8 +115,7 @@ class Planner:
         count = len(self.legs)
         feet, failure = np.zeros((count, 3)), _Failure()
         for place, leg in enumerate(self.order):
-            spots, why = self._footholds(leg, place - count)
-            feet[leg] = spots[0]
+            feet[leg], why = self._footholds(leg, place - count).first
             if why:
                 reason = f"{self.legs.names[leg]} has no foothold to begin on: {why}"
                 failure = _Failure(Status.NO_CONTACT, reason, 0.0)
@@ -135,8 +135,8 @@ class Planner:
         """Pose (6,) of the body at the end of the step before the first, in which ``leg`` has come to its place among
         ``feet`` (m, 3): so that a walk that repeats does so from the beginning."""
         before = feet.copy()
-        spots, why = self._footholds(leg, -1 - len(self.legs))
-        before[leg] = feet[leg] if why else spots[0]
+        spot, why = self._footholds(leg, -1 - len(self.legs)).first
+        before[leg] = feet[leg] if why else spot
         shape = clear_swing(self.ground, before[leg], feet[leg], self.lift, self.legs.legs[leg].radius)
         pose, _, _, _ = self._body(leg, -1, before, feet, shape or (self.lift, 1.0))
         return pose
@@ -145,16 +145,16 @@ class Planner:
         """Step ``n``, in which ``leg`` swings while the others stay at ``feet`` (m, 3), after the body's pose
         ``before`` (6,). If links or body come too near to anything, other swings, footholds and heights of the body are
         tried; if nothing helps, what comes nearest to it says why."""
-        spots, why = self._footholds(leg, n)
+        spots = self._footholds(leg, n)
+        _, why = spots.first
         if why:
             begin = n * self.step_time
             at = f"{self.legs.names[leg]} finds no foothold at {begin + self.sway_time:.4g} s"
             return _Failure(Status.NO_CONTACT, f"{at}: {why}", begin)
-        spread = spots[np.unique(np.linspace(0, len(spots) - 1, SPOTS).astype(np.int64))]
         best: _Failure | None = None
         for rise in RISES:
             doubtful: _Failure | None = None
-            for spot in spread:
+            for spot in _spread(spots):
                 step = self._tried(leg, n, feet, before, spot, rise * self.height)
                 if isinstance(step, Step):
                     return step
@@ -264,20 +264,14 @@ class Planner:
             ways += [(*(at + share * (centroid - at)), heading) for share in (0.0, step.share, AHEAD)]
         return self.over(plane, np.array(ways))
 
-    def _footholds(self, leg: int, n: float) -> tuple[Array, str]:
-        """Centres (k, 3) m, best first, of a foot that swings in step ``n``: below where the body will be in the middle
-        of its stance, or near there; and why there is none."""
+    def _footholds(self, leg: int, n: float) -> Footholds:
+        """Those of a foot that swings in step ``n``: below where the body will be in the middle of its stance, or near
+        there."""
         at, heading = self.course.at((n + 0.5 * len(self.legs)) * self.step_time)
         c, s = np.cos(heading), np.sin(heading)
         x, y = self.offsets[leg, :2]
         nominal = at + np.array([c * x - s * y, s * x + c * y])
-        return footholds(
-            self.ground,
-            nominal,
-            self.legs.legs[leg].radius,
-            self.gait.max_slope,
-            self.search,
-        )
+        return Footholds(self.ground, nominal, self.legs.legs[leg].radius, self.gait.max_slope, self.search)
 
     def _body(
         self, leg: int, n: float, before: Array, after: Array, shape: tuple[float, float], rise: float = 0.0
@@ -342,6 +336,14 @@ class Planner:
     def pose(self, at: Array, heading: float, feet: Array) -> Array:
         """(6,) x, y, z, roll, pitch, yaw over the plane through all feet, level or along it."""
         return np.asarray(self.over(self.plane(feet), np.array([[at[0], at[1], heading]]))[0])
+
+
+def _spread(spots: Footholds) -> Iterator[Array]:
+    """Centres (3,) of SPOTS footholds, the best first; the others are looked for when they are asked for."""
+    yield spots.first[0]
+    every = spots.all
+    for k in np.unique(np.linspace(0, len(every) - 1, SPOTS).astype(np.int64))[1:]:
+        yield every[k]
 
 
 def _others(feet: Array, leg: int) -> Array:

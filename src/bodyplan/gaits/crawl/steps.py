@@ -10,6 +10,7 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
+from bodyplan.ground.near import clearance_up_to
 
 #: places along a swing at which it is tried against the ground
 PLACES = 49
@@ -100,11 +101,11 @@ def clear_swings(ground: Ground, start: Array, end: Array, lift: float, radius: 
     try:
         room = min(radius, float((ground.clearance(np.stack([start + up, end + up])) - radius).min()))
         wanted = np.minimum(KEEP * lift * _hump(tau)[0], max(room, 0.0)) - EXACT
-        height = lift
+        enough, height = radius + np.maximum(wanted, 0.0) + EXACT, lift
         for _ in range(TRIES):
             for early in EARLY:
                 place, _, _ = swing_path(start, end, height, early, tau)
-                if np.all(ground.clearance(place) - radius >= wanted):
+                if np.all(clearance_up_to(ground, place, enough) - radius >= wanted):
                     yield height, early
             height *= RAISE
     except InputError:  # beyond the edge of the ground
