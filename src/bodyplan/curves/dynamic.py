@@ -8,7 +8,7 @@ wherever that one is defined.
 
 from __future__ import annotations
 
-from math import acos, cos, exp, pi, sin, sqrt
+from math import acos, cos, exp, factorial, pi, sin, sqrt
 
 import numpy as np
 from numba import njit
@@ -21,24 +21,26 @@ from bodyplan.errors import InputError
 GAMMA_STAR = 0.676454475554999
 
 
+#: coefficients of s(w) = sum (-w)^k/(2k+1)! and of its first two derivatives
+_SERIES = tuple((-1.0) ** k / factorial(2 * k + 1) for k in range(14))
+_FIRST = tuple(k * c for k, c in enumerate(_SERIES))[1:]
+_SECOND = tuple(k * c for k, c in enumerate(_FIRST))[1:]
+
+
 @njit(cache=True)
 def _circular(w: float) -> tuple[float, float, float, float]:
     """c = cos(sqrt(w)), s = sin(sqrt(w))/sqrt(w) and the first two derivatives of s with respect to w >= 0."""
-    if w < 1.0:
-        # (c - s)/(2w) loses digits as w -> 0; the series of s = sum (-w)^k/(2k+1)! does not
-        s = s1 = s2 = 0.0
-        coefficient = 1.0  # (-1)^k / (2k+1)!
-        power = 1.0  # w^k
-        for k in range(12):
-            s += coefficient * power
-            following = -coefficient / ((2 * k + 2) * (2 * k + 3))
-            s1 += (k + 1) * following * power
-            s2 += (k + 2) * (k + 1) * (-following / ((2 * k + 4) * (2 * k + 5))) * power
-            coefficient = following
-            power *= w
-        return cos(sqrt(w)), s, s1, s2
     root = sqrt(w)
-    c, s = cos(root), sin(root) / root
+    c = cos(root)
+    if w < 1.0:
+        # (c - s)/(2w) loses digits as w -> 0; the series does not
+        s = s1 = s2 = 0.0
+        for k in range(11, -1, -1):
+            s = s * w + _SERIES[k]
+            s1 = s1 * w + _FIRST[k]
+            s2 = s2 * w + _SECOND[k]
+        return c, s, s1, s2
+    s = sin(root) / root
     s1 = (c - s) / (2.0 * w)
     s2 = (-0.5 * s - 3.0 * s1) / (2.0 * w)
     return c, s, s1, s2

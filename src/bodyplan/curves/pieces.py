@@ -6,13 +6,17 @@ the shape parameters change, so that the fit can differentiate exactly.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import cos, pi, sin, sqrt
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.curves.dynamic import crossing_of, dynamic_jet, dynamic_value
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 START, KIND, ORIGIN, V, VD, VDD, G, GD, GDD = range(9)
 COLUMNS = 9
@@ -21,7 +25,22 @@ CUT, PRODUCT, NATURAL = 0, 1, 2
 RULES = {"cut": CUT, "product": PRODUCT, "natural": NATURAL}
 
 
-@njit(cache=True)
+def lean(kernel: Kernel) -> Kernel:
+    """``njit`` for kernels that make no arrays: they do without Numba's counts of references (as its own sorts do),
+    which take longer than the arithmetic of a short kernel. Assigning an array to a slice makes one."""
+    compiled: Any = njit
+    return cast(Kernel, compiled(cache=True, _nrt=False)(kernel))
+
+
+@lean
+def _flat(out: Array, k: int, start: float) -> None:
+    """Make row k a straight line on the axis from ``start`` on (kernel)."""
+    for column in range(COLUMNS):
+        out[k, column] = 0.0
+    out[k, START], out[k, KIND] = start, FLAT
+
+
+@lean
 def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: int, lead: float, out: Array) -> int:
     """Fill ``out`` (>= N_B + 4, COLUMNS) for one curve; returns the number of pieces (kernel).
 
@@ -34,11 +53,10 @@ def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: 
     modules = gammas.shape[0] - 1
     p = 0
     if lead > 0.0:
-        out[0, :] = 0.0
-        out[0, KIND] = FLAT
+        _flat(out, 0, 0.0)
         p = 1
-    out[p, :] = 0.0
-    out[p, START], out[p, KIND], out[p, ORIGIN] = lead, TAIL, lead
+    _flat(out, p, lead)
+    out[p, KIND], out[p, ORIGIN] = TAIL, lead
     v, vd, vdd = tail[0], tail[1], tail[2]
     out[p, V], out[p, VD], out[p, VDD] = v, vd, vdd
     x = lead + 0.5 * pi / omega
@@ -46,9 +64,9 @@ def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: 
     for k in range(modules + 1):
         g, gd, gdd = gammas[k, 0], gammas[k, 1], gammas[k, 2]
         p += 1
-        row = out[p]
-        row[START], row[KIND], row[ORIGIN] = x, MODULE, x
-        row[V], row[VD], row[VDD], row[G], row[GD], row[GDD] = v, vd, vdd, g, gd, gdd
+        out[p, START], out[p, KIND], out[p, ORIGIN] = x, MODULE, x
+        out[p, V], out[p, VD], out[p, VDD] = v, vd, vdd
+        out[p, G], out[p, GD], out[p, GDD] = g, gd, gdd
         head = k == modules
         span = pi / omega
         if rule == NATURAL and g < 1.0:
@@ -59,9 +77,7 @@ def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: 
         if head or (rule == CUT and f >= 0.0):
             # correction 3: a module that no longer crosses zero is followed to its own first zero, then y = 0
             p += 1
-            out[p, :] = 0.0
-            out[p, START] = x + crossing_of(g, omega, crossing if head else 1)
-            out[p, KIND] = FLAT
+            _flat(out, p, x + crossing_of(g, omega, crossing if head else 1))
             return p + 1
         fd = fg * gd
         fdd = fgg * gd * gd + fg * gdd
@@ -70,7 +86,7 @@ def build_pieces(tail: Array, gammas: Array, omega: float, crossing: int, rule: 
     return p + 1  # not reached: the head always returns
 
 
-@njit(cache=True)
+@lean
 def piece_at(x: float, pieces: Array, count: int) -> int:
     """Index of the piece that holds x, the right-hand one at a junction (kernel)."""
     i = count - 1
@@ -79,19 +95,19 @@ def piece_at(x: float, pieces: Array, count: int) -> int:
     return i
 
 
-@njit(cache=True)
-def rests(piece: Array) -> bool:
+@lean
+def rests(pieces: Array, k: int) -> bool:
     """True where the curve does not change along a piece (kernel)."""
-    return bool(piece[VD] == 0.0 and piece[VDD] == 0.0 and piece[GD] == 0.0 and piece[GDD] == 0.0)
+    return bool(pieces[k, VD] == 0.0 and pieces[k, VDD] == 0.0 and pieces[k, GD] == 0.0 and pieces[k, GDD] == 0.0)
 
 
-@njit(cache=True)
+@lean
 def rests_until(pieces: Array, count: int, other: Array, others: int) -> float:
     """x up to which a curve rests and is the same as another one, given by its own pieces; inf if it is all the same
     (kernel)."""
     for k in range(min(count, others)):
         begin = min(pieces[k, START], other[k, START])
-        if pieces[k, START] != other[k, START] or not rests(pieces[k]):
+        if pieces[k, START] != other[k, START] or not rests(pieces, k):
             return float(begin)
         for column in (KIND, ORIGIN, V, G):
             if pieces[k, column] != other[k, column]:
@@ -101,18 +117,18 @@ def rests_until(pieces: Array, count: int, other: Array, others: int) -> float:
     return float(pieces[others, START] if count > others else other[count, START])
 
 
-@njit(cache=True)
-def piece_jet(x: float, piece: Array, omega: float) -> tuple[float, float, float, float, float, float]:
+@lean
+def piece_jet(x: float, pieces: Array, k: int, omega: float) -> tuple[float, float, float, float, float, float]:
     """y, y_x, y_xx, y_t, y_xt, y_tt of one piece at x (kernel)."""
-    if piece[KIND] == FLAT:
+    if pieces[k, KIND] == FLAT:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    v, vd, vdd = piece[V], piece[VD], piece[VDD]
-    if piece[KIND] == TAIL:
-        X = omega * (x - piece[ORIGIN])
+    v, vd, vdd = pieces[k, V], pieces[k, VD], pieces[k, VDD]
+    if pieces[k, KIND] == TAIL:
+        X = omega * (x - pieces[k, ORIGIN])
         s, c = sin(X), omega * cos(X)
         return v * s, v * c, -omega * omega * v * s, vd * s, vd * c, vdd * s
-    gd, gdd = piece[GD], piece[GDD]
-    f, fx, fxx, fg, fxg, fgg = dynamic_jet(x - piece[ORIGIN], piece[G], omega)
+    gd, gdd = pieces[k, GD], pieces[k, GDD]
+    f, fx, fxx, fg, fxg, fgg = dynamic_jet(x - pieces[k, ORIGIN], pieces[k, G], omega)
     return (
         v * f,
         v * fx,
@@ -123,17 +139,17 @@ def piece_jet(x: float, piece: Array, omega: float) -> tuple[float, float, float
     )
 
 
-@njit(cache=True)
-def piece_value(x: float, piece: Array, omega: float) -> tuple[float, float, float]:
+@lean
+def piece_value(x: float, pieces: Array, k: int, omega: float) -> tuple[float, float, float]:
     """y, y_x, y_xx of one piece at x (kernel)."""
-    if piece[KIND] == FLAT:
+    if pieces[k, KIND] == FLAT:
         return 0.0, 0.0, 0.0
-    v = piece[V]
-    if piece[KIND] == TAIL:
-        X = omega * (x - piece[ORIGIN])
+    v = pieces[k, V]
+    if pieces[k, KIND] == TAIL:
+        X = omega * (x - pieces[k, ORIGIN])
         s = v * sin(X)
         return s, v * omega * cos(X), -omega * omega * s
-    f, fx, fxx = dynamic_value(x - piece[ORIGIN], piece[G], omega)
+    f, fx, fxx = dynamic_value(x - pieces[k, ORIGIN], pieces[k, G], omega)
     return v * f, v * fx, v * fxx
 
 
@@ -143,7 +159,7 @@ def evaluate(x: Array, pieces: Array, counts: IntArray, omega: float, y: Array, 
     for b in range(x.shape[0]):
         for i in range(x.shape[1]):
             k = piece_at(x[b, i], pieces[b], counts[b])
-            y[b, i], slope[b, i], _ = piece_value(x[b, i], pieces[b, k], omega)
+            y[b, i], slope[b, i], _ = piece_value(x[b, i], pieces[b], k, omega)
 
 
 @njit(cache=True)
@@ -159,7 +175,7 @@ def build_batch(
         counts[b] = build_pieces(t, g, omega, crossing, rule, lead, out[b])
 
 
-@njit(cache=True)
+@lean
 def arc_between(a: float, b: float, pieces: Array, count: int, omega: float, nodes: Array, weights: Array) -> float:
     """Arc length from x = a to x = b >= a, Gauss-Legendre in steps of at most a quarter radian of the wave (kernel)."""
     total = 0.0
@@ -177,7 +193,7 @@ def arc_between(a: float, b: float, pieces: Array, count: int, omega: float, nod
             for j in range(steps):
                 for m in range(nodes.size):
                     at = x + h * (j + nodes[m])
-                    slope = piece_value(at, pieces[k], omega)[1]
+                    slope = piece_value(at, pieces, k, omega)[1]
                     total += weights[m] * h * sqrt(1.0 + slope * slope)
         x = end
         k += 1

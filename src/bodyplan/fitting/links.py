@@ -63,22 +63,23 @@ class LinksFit:
         return self
 
 
-@njit(cache=True)
-def _bounds(piece: Array, omega: float, y: float, slope: float) -> tuple[float, float]:
+@pc.lean
+def _bounds(pieces: Array, k: int, omega: float, y: float, slope: float) -> tuple[float, float]:
     """Bounds of |y'| and |y''| on the rest of a piece, from a point with the given y and slope on."""
-    if piece[pc.KIND] == pc.FLAT:
+    if pieces[k, pc.KIND] == pc.FLAT:
         return 0.0, 0.0
     # F'' + 2 g w F' + w^2 F = 0 loses energy (the tail's sine keeps it), so |(F', w F)| never grows
     energy = sqrt(slope * slope + omega * omega * y * y)
-    return energy, energy * omega * sqrt(1.0 + 4.0 * piece[pc.G] * piece[pc.G])
+    return energy, energy * omega * sqrt(1.0 + 4.0 * pieces[k, pc.G] * pieces[k, pc.G])
 
 
-@njit(cache=True)
+@pc.lean
 def next_joint(
-    x0: float, y0: float, k: int, steepest: float, length: float, pieces: Array, count: int, omega: float
+    x0: float, y0: float, k: int, steepest: float, length: float, guess: float, pieces: Array, count: int, omega: float
 ) -> float:
     """x of the first point ahead of (x0, y0) at distance ``length`` (kernel). The point lies on piece k, on the rest
-    of which the curve is no steeper than ``steepest``."""
+    of which the curve is no steeper than ``steepest``. ``guess`` (or nan) of it is where iteration begins once there
+    can be no point before."""
     # the arc is at least as long as the distance
     x = x0 + length / sqrt(1.0 + steepest * steepest)
     if k + 1 < count and x >= pieces[k + 1, pc.START]:
@@ -89,18 +90,18 @@ def next_joint(
         end = reach
         if k + 1 < count and pieces[k + 1, pc.START] < end:
             end = pieces[k + 1, pc.START]
-        y, slope, curve = pc.piece_value(x, pieces[k], omega)
+        y, slope, curve = pc.piece_value(x, pieces, k, omega)
         while True:
             dx, dy = x - x0, y - y0
             g = (dx - length) * (dx + length) + dy * dy
             if g >= 0.0:
                 return x
             g1 = 2.0 * (dx + dy * slope)
-            m1, m2 = _bounds(pieces[k], omega, y, slope)
+            m1, m2 = _bounds(pieces, k, omega, y, slope)
             left = end - x
             if g1 + min(2.0 - 2.0 * (abs(dy) + m1 * left) * m2, 0.0) * left > 0.0:
                 # the distance grows all the way to the end: one root at most, any fast iteration finds it
-                found = _growing(x0, y0, x, end, length, g, g1, curve, slope, dy, pieces[k], omega)
+                found = _growing(x0, y0, x, end, length, g, g1, curve, slope, dy, guess, pieces, k, omega)
                 if found < np.inf:
                     return found
                 break
@@ -113,7 +114,7 @@ def next_joint(
             if step <= 2e-16 * length or x + step == x:
                 return x
             x += step
-            y, slope, curve = pc.piece_value(x, pieces[k], omega)
+            y, slope, curve = pc.piece_value(x, pieces, k, omega)
         if end == reach:
             # only a level link reaches so far, and rounding may put it past the last piece's own answer
             return reach
@@ -121,7 +122,7 @@ def next_joint(
         k += 1
 
 
-@njit(cache=True)
+@pc.lean
 def _growing(
     x0: float,
     y0: float,
@@ -133,12 +134,24 @@ def _growing(
     curve: float,
     slope: float,
     dy: float,
-    piece: Array,
+    guess: float,
+    pieces: Array,
+    k: int,
     omega: float,
 ) -> float:
     """Root of the squared distance minus length^2 in (x, end], where it grows: roots of local parabolas in a bracket
-    (cubic convergence); inf where it is negative up to the end (kernel)."""
+    (cubic convergence) from x or the ``guess``; inf where it is negative up to the end (kernel)."""
     low, high, open_end = x, end, True
+    if low < guess < high:
+        x = guess
+        y, slope, curve = pc.piece_value(x, pieces, k, omega)
+        dy = y - y0
+        g = (x - x0 - length) * (x - x0 + length) + dy * dy
+        g1 = 2.0 * (x - x0 + dy * slope)
+        if g < 0.0:
+            low = x
+        else:
+            high, open_end = x, False
     for _ in range(100):
         g2 = 2.0 + 2.0 * slope * slope + 2.0 * dy * curve
         inner = g1 * g1 - 2.0 * g * g2
@@ -150,7 +163,7 @@ def _growing(
             return following
         if not low < following < high:
             if open_end:
-                y = pc.piece_value(end, piece, omega)[0]
+                y = pc.piece_value(end, pieces, k, omega)[0]
                 if (end - x0 - length) * (end - x0 + length) + (y - y0) * (y - y0) < 0.0:
                     return np.inf
                 open_end = False
@@ -158,7 +171,7 @@ def _growing(
             if high - low <= 4e-16 * (abs(high) + length):
                 return following
         x = following
-        y, slope, curve = pc.piece_value(x, piece, omega)
+        y, slope, curve = pc.piece_value(x, pieces, k, omega)
         dy = y - y0
         g = (x - x0 - length) * (x - x0 + length) + dy * dy
         g1 = 2.0 * (x - x0 + dy * slope)
@@ -171,7 +184,7 @@ def _growing(
     return x
 
 
-@njit(cache=True)
+@pc.lean
 def _tight(
     a: float,
     b: float,
@@ -192,9 +205,10 @@ def _tight(
     return arc > TIGHT_ARC * length or (whole_fold and arc > FOLD_ARC * length)
 
 
-@njit(cache=True)
+@pc.lean
 def place_chain(
     first: int,
+    step: float,
     lengths: Array,
     pieces: Array,
     count: int,
@@ -206,18 +220,20 @@ def place_chain(
     angles: Array,
 ) -> int:
     """One chain on one curve from joint ``first`` on, whose x is points[first, 0] (kernel): fills points (n + 1, 2),
-    local (n + 1, 3) slope and second derivative of the curve there and the piece, and angles (n,); returns the first
-    link too tight of those placed, or -1."""
+    local (n + 1, 3 and more) slope and second derivative of the curve there and the piece, and angles (n,); returns the
+    first link too tight of those placed, or -1. Where points are those of the same chain before the curve went on by
+    ``step`` and local[:, 3:5] the speed and acceleration along x that they had, it is done sooner; else nan."""
     x = points[first, 0]
     k = pc.piece_at(x, pieces, count)
-    y, slope, curve = pc.piece_value(x, pieces[k], omega)
+    y, slope, curve = pc.piece_value(x, pieces, k, omega)
     points[first, 1] = y
     local[first, 0], local[first, 1], local[first, 2] = slope, curve, k
     tight = -1
     for i in range(first, lengths.size):
         length = lengths[i]
-        steepest = _bounds(pieces[k], omega, y, slope)[0]
-        xn = next_joint(x, y, k, steepest, length, pieces, count, omega)
+        steepest = _bounds(pieces, k, omega, y, slope)[0]
+        guess = points[i + 1, 0] + step * (local[i + 1, 3] + 0.5 * step * local[i + 1, 4])
+        xn = next_joint(x, y, k, steepest, length, guess, pieces, count, omega)
         before = k
         while k + 1 < count and xn >= pieces[k + 1, pc.START]:
             k += 1
@@ -226,7 +242,7 @@ def place_chain(
                 steepest = max(steepest, abs(pieces[j, pc.V]) * omega)
             if _tight(x, xn, steepest, length, pieces, count, omega, nodes, weights):
                 tight = i
-        yn, slope, curve = pc.piece_value(xn, pieces[k], omega)
+        yn, slope, curve = pc.piece_value(xn, pieces, k, omega)
         angles[i] = atan2(yn - y, xn - x)
         x, y = xn, yn
         points[i + 1, 0], points[i + 1, 1] = x, y
@@ -234,20 +250,21 @@ def place_chain(
     return tight
 
 
-@njit(cache=True)
-def chain_rates(
-    first: int, points: Array, local: Array, pieces: Array, omega: float, rates: Array
-) -> tuple[float, float]:
+@pc.lean
+def chain_rates(first: int, points: Array, local: Array, pieces: Array, omega: float, rates: Array) -> None:
     """First and second derivative of the links' angles by the curve's progress t, (2, n), for joints that
-    :func:`place_chain` put on the curve, of which those up to ``first`` rest (kernel). Returns the last joint's speed
+    :func:`place_chain` put on the curve, of which those up to ``first`` rest (kernel); and local[:, 3:5], their speed
     and acceleration along x."""
     x, y = points[first, 0], points[first, 1]
-    _, _, yd, _, ydd = _moving(x, local[first], pieces, omega)
+    _, _, yd, _, ydd = _moving(first, points, local, pieces, omega)
     xd, xdd = 0.0, 0.0
-    rates[:, :first] = 0.0
+    for i in range(first):
+        rates[0, i], rates[1, i] = 0.0, 0.0
+        local[i, 3], local[i, 4] = 0.0, 0.0
+    local[first, 3], local[first, 4] = 0.0, 0.0
     for i in range(first, rates.shape[1]):
         xn, yn = points[i + 1, 0], points[i + 1, 1]
-        yx, yxx, yt, yxt, ytt = _moving(xn, local[i + 1], pieces, omega)
+        yx, yxx, yt, yxt, ytt = _moving(i + 1, points, local, pieces, omega)
         ux, uy = xn - x, yn - y
         # u . u' = 0 along t, twice: the new joint's speed and acceleration along x
         across = ux + uy * yx
@@ -261,16 +278,18 @@ def chain_rates(
         rates[0, i] = (ux * vy - uy * vx) / square
         rates[1, i] = (ux * (yndd - ydd) - uy * (xndd - xdd)) / square
         x, y, xd, yd, xdd, ydd = xn, yn, xnd, ynd, xndd, yndd
-    return xd, xdd
+        local[i + 1, 3], local[i + 1, 4] = xd, xdd
 
 
-@njit(cache=True)
-def _moving(x: float, local: Array, pieces: Array, omega: float) -> tuple[float, float, float, float, float]:
-    """y_x, y_xx, y_t, y_xt, y_tt at a joint (kernel)."""
-    piece = pieces[int(local[2])]
-    if pc.rests(piece):
-        return local[0], local[1], 0.0, 0.0, 0.0
-    _, yx, yxx, yt, yxt, ytt = pc.piece_jet(x, piece, omega)
+@pc.lean
+def _moving(
+    j: int, points: Array, local: Array, pieces: Array, omega: float
+) -> tuple[float, float, float, float, float]:
+    """y_x, y_xx, y_t, y_xt, y_tt at joint j (kernel)."""
+    k = int(local[j, 2])
+    if pc.rests(pieces, k):
+        return local[j, 0], local[j, 1], 0.0, 0.0, 0.0
+    _, yx, yxx, yt, yxt, ytt = pc.piece_jet(points[j, 0], pieces, k, omega)
     return yx, yxx, yt, yxt, ytt
 
 
@@ -294,10 +313,12 @@ def _fit_range(
     tight: IntArray,
 ) -> int:
     """:func:`place_chain` for the curves begin .. end - 1 (kernel)."""
-    local = np.empty((lengths.size + 1, 3))
+    local = np.empty((lengths.size + 1, 5))
     for b in range(begin, end):
         points[b, 0, 0] = start[b]
-        tight[b] = place_chain(0, lengths, pieces[b], counts[b], omega, nodes, weights, points[b], local, angles[b])
+        tight[b] = place_chain(
+            0, np.nan, lengths, pieces[b], counts[b], omega, nodes, weights, points[b], local, angles[b]
+        )
     return 0
 
 

@@ -82,7 +82,7 @@ def stretching(
     return Stages(names, frozen(pair[0]), frozen(pair[1]), frozen(start), frozen(duration), blend)
 
 
-@njit(cache=True)
+@pc.lean
 def _ramps(s: float, initial: Array, final: Array, start: Array, duration: Array, blend: int, out: Array) -> None:
     """Parameters and their first two derivatives with respect to progress, out (p, 3)."""
     for i in range(initial.size):
@@ -129,7 +129,7 @@ class Chain(NamedTuple):
 
 class Scratch(NamedTuple):
     """What a kernel needs for one chain at one progress: parameters (p, 3), pieces, points (n + 1, 2), local
-    (n + 1, 3), angles (n,), rates (2, n)."""
+    (n + 1, 5), angles (n,), rates (2, n); and the progress (1,) they belong to."""
 
     parameters: Array
     pieces: Array
@@ -137,6 +137,7 @@ class Scratch(NamedTuple):
     local: Array
     angles: Array
     rates: Array
+    progress: Array
 
 
 @njit(cache=True)
@@ -147,13 +148,14 @@ def scratch_of(chain: Chain) -> Scratch:
         np.empty((p, 3)),
         np.empty((p + 2, pc.COLUMNS)),
         np.empty((n + 1, 2)),
-        np.empty((n + 1, 3)),
+        np.empty((n + 1, 5)),
         np.empty(n),
         np.empty((2, n)),
+        np.full(1, np.nan),
     )
 
 
-@njit(cache=True)
+@pc.lean
 def body_at(s: float, chain: Chain, at: Scratch) -> tuple[float, float, float, int]:
     """One chain at one progress (kernel): fills ``at``; returns the extent along x with its two derivatives, and the
     first link that is too tight or -1."""
@@ -166,12 +168,15 @@ def body_at(s: float, chain: Chain, at: Scratch) -> tuple[float, float, float, i
     first = 0
     while first < n and chain.points[first + 1, 0] <= same:
         first += 1
-    for j in range(first + 1):
+    for j in range(first + 1):  # numba copies what is assigned to a slice, in case it overlaps
         at.points[j, 0], at.points[j, 1] = chain.points[j, 0], chain.points[j, 1]
-        at.local[j, :] = chain.local[j]
-    at.angles[:first] = chain.angles[:first]
+        for column in range(3):
+            at.local[j, column] = chain.local[j, column]
+    for j in range(first):
+        at.angles[j] = chain.angles[j]
     tight = place_chain(
         first,
+        s - at.progress[0],
         chain.lengths,
         at.pieces,
         count,
@@ -184,8 +189,9 @@ def body_at(s: float, chain: Chain, at: Scratch) -> tuple[float, float, float, i
     )
     if 0 <= chain.tight < first:
         tight = chain.tight
-    speed, acceleration = chain_rates(first, at.points, at.local, at.pieces, chain.omega, at.rates)
-    return at.points[n, 0] - at.points[0, 0], speed, acceleration, tight
+    chain_rates(first, at.points, at.local, at.pieces, chain.omega, at.rates)
+    at.progress[0] = s
+    return at.points[n, 0] - at.points[0, 0], at.local[n, 3], at.local[n, 4], tight
 
 
 @njit(cache=True)
@@ -197,6 +203,7 @@ def _rest(chain: Chain) -> tuple[int, int]:
     count = pc.build_pieces(still[0], still[1:], chain.omega, chain.crossing, pc.CUT, chain.lead, chain.pieces)
     tight = place_chain(
         0,
+        np.nan,
         chain.lengths,
         chain.pieces,
         count,
@@ -216,7 +223,8 @@ def _bodies(progress: Array, chain: Chain, angles: Array, rates: Array, extents:
     for i in range(progress.size):
         e0, e1, e2, tight[i] = body_at(progress[i], chain, at)
         extents[i, 0], extents[i, 1], extents[i, 2] = e0, e1, e2
-        angles[i], rates[i] = at.angles, at.rates
+        for j in range(chain.lengths.size):
+            angles[i, j], rates[i, 0, j], rates[i, 1, j] = at.angles[j], at.rates[0, j], at.rates[1, j]
 
 
 @dataclass(frozen=True)
@@ -269,7 +277,7 @@ class StretchingBody:
             pieces=np.zeros((p + 2, pc.COLUMNS)),
             rows=0,  # nothing is known to rest yet
             points=np.zeros((n + 1, 2)),
-            local=np.zeros((n + 1, 3)),
+            local=np.zeros((n + 1, 5)),
             angles=np.zeros(n),
             tight=-1,
         )

@@ -20,8 +20,9 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array
+from bodyplan.curves import pieces as pc
 from bodyplan.errors import InputError
-from bodyplan.gaits.stretching import Chain, StretchingBody, body_at, scratch_of
+from bodyplan.gaits.stretching import Chain, Scratch, StretchingBody, body_at, scratch_of
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def _progress_at(target: float, low: float, high: float, chain: Chain) -> float:
     return s
 
 
-@njit(cache=True)
+@pc.lean
 def _ahead(u: float, before: Array, last: Array) -> float:
     """s at u, from u, s, s' and s'' at one or two places before (kernel): the quintic through both, where the second
     is not much nearer to u than to the first; else a parabola."""
@@ -106,20 +107,36 @@ def _sweep(
     sign: float,
     front: Chain,
     back: Chain,
-    angles: Array,
-    first: Array,
-    second: Array,
-    progress: Array,
+    out: tuple[Array, Array, Array, Array],
 ) -> None:
-    """Angles and derivatives of the sweep at ascending u, and s and r (kernel).
+    """:func:`_along` with room of its own (kernel)."""
+    a, b = scratch_of(front), scratch_of(back)
+    before, last = np.full(4, np.nan), np.full(4, np.nan)
+    launch = launch_end, landing_start, s_launch, r_landing, total, target, sign
+    _along(u, launch, front, back, a, b, before, last, out)
+
+
+@pc.lean
+def _along(
+    u: Array,
+    launch: tuple[float, float, float, float, float, float, float],
+    front: Chain,
+    back: Chain,
+    a: Scratch,
+    b: Scratch,
+    before: Array,
+    last: Array,
+    out: tuple[Array, Array, Array, Array],
+) -> None:
+    """Angles and derivatives of the sweep at ascending u, and s and r (kernel). ``before`` and ``last``: u, s, s', s''
+    at the places before, nan if there are none.
 
     In transit s is a root of gain(s) + gain(s - u) = target, found by Newton in a bracket that shrinks, from a
     prediction by the places before it. The bodies of its last evaluation are the result.
     """
+    launch_end, landing_start, s_launch, r_landing, total, target, sign = launch
+    angles, first, second, progress = out
     n = front.lengths.size
-    a, b = scratch_of(front), scratch_of(back)
-    a_at, b_at = np.nan, np.nan  # progress of what they hold
-    before, last = np.full(4, np.nan), np.full(4, np.nan)
     for i in range(u.size):
         moving = launch_end < u[i] < landing_start
         slip = 0.0
@@ -127,12 +144,10 @@ def _sweep(
             s = u[i] + total if u[i] <= launch_end else total
             s = min(max(s, 0.0), total)
             r = min(max(s - u[i], 0.0), total)
-            if s != a_at:
+            if s != a.progress[0]:
                 body_at(s, front, a)
-                a_at = s
-            if r != b_at:
+            if r != b.progress[0]:
                 body_at(r, back, b)
-                b_at = r
             s1, s2 = 1.0 if u[i] < landing_start else 0.0, 0.0
         else:
             low, high = max(s_launch, u[i] + r_landing), min(total, u[i] + total)
@@ -159,13 +174,13 @@ def _sweep(
                 s = following
             if slope <= 0.0 or abs(slip) > CLOSE:
                 slip = 0.0
-            a_at, b_at = np.nan, np.nan
             # gain'(s) s' + gain'(r) r' = 0 with s' - r' = 1
             s1, s2 = (b1 / slope, 0.0) if slope > 0.0 else (0.5, 0.0)
             both = slope if slope > 0.0 else 1.0
             s2 = (b2 * (s1 - 1.0) * a1 - b1 * a2 * s1) / both**2
             r = s - u[i]
-            before[:] = last
+            for k in range(4):
+                before[k] = last[k]
             last[0], last[1], last[2], last[3] = u[i], s + slip, s1, s2
         r1 = s1 - 1.0
         progress[i, 0], progress[i, 1] = s + slip, r + slip
@@ -258,10 +273,7 @@ class ExtensionSweep:
             self.sign,
             self.front.chain,
             self.back.chain,
-            angles,
-            first,
-            second,
-            progress,
+            (angles, first, second, progress),
         )
         return angles, first, second, progress
 
