@@ -329,6 +329,6 @@ def _wall_overlap(robot: Robot, ground: Ground, joints: Array) -> float | None:
     if reach >= 0.5 * ground.width:
         raise InputError(
             f"Concertina: the contracted body needs {2.0 * (reach + radius):.4g} m between the walls, the corridor has "
-            f"{ground.width:.4g} m; use more body_modules, a larger omega or shorter links."
+            f"{ground.width:.4g} m; use more body_modules, a smaller omega or shorter links."
         )
     return reach + radius - 0.5 * ground.width

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ def _head(made: Sweep) -> str:
         ),
         (
             "Time for the points",
-            figure(sum(row.seconds for row in made.rows), "s", 3),
+            _time(sum(row.seconds for row in made.rows)),
             "of one core, all points together",
         ),
     ]
@@ -77,6 +77,14 @@ def _head(made: Sweep) -> str:
         f"<p>Each point is the mission with other values of its fields, planned, checked and simulated.</p></header>"
         f'{stopped}<dl class="tiles">{cells}</dl>'
     )
+
+
+def _time(seconds: float) -> str:
+    """A time in the unit that reads best."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 3.0 * size:
+            return figure(seconds / size, unit, 3)
+    return figure(seconds, "s", 3)
 
 
 def best_points(made: Sweep) -> str:
@@ -102,8 +110,8 @@ def _quoted(item: str) -> str:
 
 
 def measure_plots(made: Sweep, measure: Measure) -> dict[str, tuple[dict[str, Any], str]]:
-    """Plot and caption by name: curves over one field; over two a heat map; over more, the highest value of the other
-    fields in each cell, and curves over each field."""
+    """Plot and caption by name: curves over one field; over two a heat map; over more, the highest and the lowest
+    value of the other fields in each cell, and curves of both over each field."""
     values = _grid(made, measure)
     if np.isnan(values).all():
         return {}
@@ -115,18 +123,23 @@ def measure_plots(made: Sweep, measure: Measure) -> dict[str, tuple[dict[str, An
         if len(made.axes[1].values) <= MOST_LINES:
             out["curves"] = (curves(made, values, title), "")
         return out
-    first_two = _highest(values, tuple(range(2, values.ndim)))
-    note = "In each cell the highest value over all other fields; blank where no point is ok."
-    out = {"map": (heat_map(made, first_two, title), note)}
+    out = {}
+    rest = tuple(range(2, values.ndim))
+    for word, ends in ENDS.items():
+        note = f"In each cell the {word} value over all other fields; blank where no point is ok."
+        out[f"map_{word}"] = (heat_map(made, ends(values, rest), f"{title}, {word}"), note)
     for k, axis in enumerate(made.axes):
-        best = _highest(values, tuple(i for i in range(values.ndim) if i != k))
-        data = (
-            [line(_place(made, k), best, "highest", SERIES[0], mode="lines+markers")]
-            if axis.numeric
-            else [{"type": "bar", "x": _place(made, k), "y": compact(best), "marker": {"color": SERIES[0]}}]
-        )
+        others = tuple(i for i in range(values.ndim) if i != k)
+        data = []
+        for number, (word, ends) in enumerate(ENDS.items()):
+            best = ends(values, others)
+            if axis.numeric:
+                data.append(line(_place(made, k), best, word, SERIES[number], mode="lines+markers"))
+            else:
+                bars = {"type": "bar", "name": word, "x": _place(made, k), "y": compact(best)}
+                data.append(bars | {"marker": {"color": SERIES[number]}})
         described = {"data": data, "layout": layout(label(made.label(axis.key)), label(title), 300)}
-        out[f"over_{k}"] = (described, f"The highest value over all other fields, by {axis.key}.")
+        out[f"over_{k}"] = (described, f"The highest and the lowest value over all other fields, by {axis.key}.")
     return out
 
 
@@ -146,6 +159,15 @@ def _highest(values: Array, over: tuple[int, ...]) -> Array:
     """Largest value over some axes; NaN where all are."""
     filled = np.where(np.isnan(values), -np.inf, values).max(axis=over)
     return np.where(np.isinf(filled), np.nan, filled)
+
+
+def _lowest(values: Array, over: tuple[int, ...]) -> Array:
+    """Smallest value over some axes; NaN where all are."""
+    return -_highest(-values, over)
+
+
+#: a figure may be one to raise or one to lower: both ends are shown
+ENDS: dict[str, Callable[[Array, tuple[int, ...]], Array]] = {"highest": _highest, "lowest": _lowest}
 
 
 def _place(made: Sweep, k: int) -> Any:
