@@ -298,8 +298,11 @@ class ConcertinaBody:
 
     @cached_property
     def peaks(self) -> dict[str, float]:
-        """Largest joint rate of a cycle, on a grid of its own (samples may miss it); and, for the smooth blend,
-        the largest acceleration: with the linear blend rates jump and it has none."""
+        """Largest joint rate of a cycle, on a grid of its own (samples may miss it) or as its limit has found it; and,
+        for the smooth blend, the largest acceleration: with the linear blend rates jump and it has none."""
+        found = self.cycle.peak_rate
+        if found is not None and self.gait.blend == "linear" and np.ptp(self.snake.scale) == 0.0:
+            return {"peak_joint_rate": found / float(np.abs(self.snake.scale[0]))}
         state = self.cycle.state(np.linspace(0.0, self.cycle.period, 4001)[:-1])
         scale = np.abs(self.snake.scale)
         out = {"peak_joint_rate": float((np.abs(np.diff(state.rates, axis=1)) / scale).max())}

@@ -86,8 +86,12 @@ class ExtensionCycle:
         self.clock = Clock(nodes, np.ones_like(nodes), duration / waves)
         if warp:
             self.clock = self._warped(nodes, self._shape, duration / waves)
+        #: largest joint rate found in looking for it, rad/s; None where no limit asks for it
+        self.peak_rate: float | None = None
         if max_joint_rate is not None:
-            self.clock = self.clock.scaled(self.clock.period * self._peak_rate() / max_joint_rate)
+            found, before = self._peak_rate(), self.clock.period
+            self.clock = self.clock.scaled(before * found * PEAK_MARGIN / max_joint_rate)
+            self.peak_rate = found * before / self.clock.period
         self.period = self.clock.period
         ends = self._shape(np.array([0.0, self.switch, self.span]))[0]
         reach = np.stack([(lengths * np.cos(ends)).sum(axis=1), (lengths * np.sin(ends)).sum(axis=1)], axis=1)
@@ -159,13 +163,15 @@ class ExtensionCycle:
         return CubicSpline(knots, angles, bc_type="periodic")
 
     def _peak_rate(self) -> float:
-        """Largest joint rate, found on a grid and once more around its peaks; PEAK_MARGIN for what lies between."""
-        step = self.clock.period / (4 * TABLE)
+        """Largest joint rate that is found on a grid, as fine as that of the warp, and once more around its peaks;
+        PEAK_MARGIN is for what lies between."""
+        count = 4 * max(TABLE // self.waves, 200)
+        step = self.clock.period / count
         edges = self.clock.times[:-1, None] + np.array([-1e-7, 0.0, 1e-7]) * self.clock.period
-        at = np.unique(np.concatenate([np.arange(4 * TABLE) * step, edges.ravel() % self.clock.period]))
+        at = np.unique(np.concatenate([np.arange(count) * step, edges.ravel() % self.clock.period]))
         peaks = at[np.argsort(self._largest_rates(at))[-8:]]
         around = (peaks[:, None] + np.linspace(-step, step, 41)).ravel() % self.clock.period
-        return float(self._largest_rates(np.sort(around)).max()) * PEAK_MARGIN
+        return float(self._largest_rates(np.sort(around)).max())
 
     def _largest_rates(self, local: Array) -> Array:
         position, speed, _ = self.clock.position(local)
