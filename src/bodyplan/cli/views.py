@@ -24,9 +24,13 @@ def view(
         from bodyplan.viewing import view as start
 
         viewer = start(mission, overrides=set_ or (), port=port, simulate=simulate)
-        say(viewer.session.source.title, bold=True)
-        typer.echo(f"  watch      {viewer.url}  (on this machine only; ctrl-C ends it)")
-        if browser:
-            viewer.open()
-        viewer.wait()
+        with viewer:
+            try:
+                say(viewer.session.source.title, bold=True)
+                typer.echo(f"  watch      {viewer.url}  (on this machine only; ctrl-C ends it)")
+                if browser:
+                    viewer.open()
+                viewer.wait()
+            except KeyboardInterrupt:  # as soon as the address is told, before anybody waits
+                pass
         typer.echo("stopped", err=True)
