@@ -9,7 +9,7 @@ import numpy as np
 from bodyplan.show.outcome import Outcome
 from bodyplan.show.playback import Playback
 from bodyplan.show.remarks import advance_in_words, plan_warnings, went_back
-from bodyplan.show.text import counted, esc, figure, listed, percent, plain, unit_of, words
+from bodyplan.show.text import counted, esc, figure, listed, percent, plain, prose, unit_of, words
 from bodyplan.simulate.wheels import turning_remarks
 
 #: failed checks that are told beside the verdict
@@ -18,7 +18,7 @@ TOLD = 3
 
 def head(outcome: Outcome, playback: Playback) -> str:
     """Title, what it is about, one sentence, verdict and tiles."""
-    about = "".join(f'<p class="about">{esc(part)}</p>' for part in outcome.about.split("\n\n") if part.strip())
+    about = "".join(f'<p class="about">{prose(part)}</p>' for part in outcome.about.split("\n\n") if part.strip())
     return (
         f'<header><p class="kicker">bodyplan report</p><h1>{esc(outcome.title)}</h1>{about}'
         f"<p>{sentence(outcome, playback)}</p></header>\n{verdict(outcome)}\n{_missed(outcome)}"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import html
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -35,6 +36,11 @@ _UNITS = {
 def esc(value: object) -> str:
     """Text that is safe in HTML, in attributes too."""
     return html.escape(str(value), quote=True)
+
+
+def prose(text: str) -> str:
+    """Text of a mission as HTML: what stands between backticks is code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", esc(text))
 
 
 def figure(value: float | None, unit: str = "", digits: int = 4, *, zeros: bool = False) -> str:
