@@ -240,7 +240,15 @@ def test_view_refuses_what_it_cannot_show(busy: int) -> None:
 
 def test_control_c_ends_it() -> None:
     command = [sys.executable, "-m", "bodyplan.cli", "view", "inching", "--no-browser", "--port", "0"]
-    out = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ})
+    # a suite that runs in the background ignores ctrl-C, and so would what it starts
+    out = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     assert isinstance(out.stdout, io.TextIOBase)
     lines = [out.stdout.readline(), out.stdout.readline()]
     assert "http://127.0.0.1:" in lines[1]
