@@ -12,7 +12,7 @@ from bodyplan.search.sweep_page import LISTED, failures, shown
 from bodyplan.show.document import document
 from bodyplan.show.layout import label, layout
 from bodyplan.show.series import EXECUTED, PLANNED, SERIES, compact
-from bodyplan.show.text import NOTHING, esc, figure, folded, plot, section, table
+from bodyplan.show.text import NOTHING, elapsed, esc, figure, folded, plot, section, table
 
 GREY = "#9aa3ab"
 
@@ -49,7 +49,7 @@ def _head(made: Search) -> str:
     tiles = [
         ("Trials", str(len(made.trials)), f"suggested by Optuna ({made.sampler})"),
         ("Within all bounds", str(kept), "and well in plan, checks and physics"),
-        ("Time", figure(seconds, "s", 3), "all trials one after another"),
+        ("Time", elapsed(seconds), "all trials one after another"),
     ]
     cells = "".join(
         f'<div class="tile"><dt>{esc(name)}</dt><dd>{esc(value)}<small>{esc(note)}</small></dd></div>'

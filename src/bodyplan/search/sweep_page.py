@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,14 @@ from bodyplan.search.sweeps import Sweep
 from bodyplan.show.document import document
 from bodyplan.show.layout import label, layout, line
 from bodyplan.show.series import SERIES, compact
-from bodyplan.show.text import counted, esc, figure, folded, plot, section, table
+from bodyplan.show.text import counted, elapsed, esc, figure, folded, plot, section, table
 
 #: points that the page lists; the table of the folder has all
 LISTED = 500
 #: lines of one plot
 MOST_LINES = 8
+#: a figure may be one to raise or one to lower: both ends are shown; NaN only where all values are
+ENDS = {"highest": np.fmax, "lowest": np.fmin}
 #: from low to high, apart for every kind of colour vision and in grey
 SCALE = "Viridis"
 
@@ -58,7 +60,7 @@ def _head(made: Sweep) -> str:
         ),
         (
             "Time for the points",
-            _time(sum(row.seconds for row in made.rows)),
+            elapsed(sum(row.seconds for row in made.rows)),
             "of one core, all points together",
         ),
     ]
@@ -77,14 +79,6 @@ def _head(made: Sweep) -> str:
         f"<p>Each point is the mission with other values of its fields, planned, checked and simulated.</p></header>"
         f'{stopped}<dl class="tiles">{cells}</dl>'
     )
-
-
-def _time(seconds: float) -> str:
-    """A time in the unit that reads best."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 3.0 * size:
-            return figure(seconds / size, unit, 3)
-    return figure(seconds, "s", 3)
 
 
 def best_points(made: Sweep) -> str:
@@ -125,14 +119,14 @@ def measure_plots(made: Sweep, measure: Measure) -> dict[str, tuple[dict[str, An
         return out
     out = {}
     rest = tuple(range(2, values.ndim))
-    for word, ends in ENDS.items():
+    for word, end in ENDS.items():
         note = f"In each cell the {word} value over all other fields; blank where no point is ok."
-        out[f"map_{word}"] = (heat_map(made, ends(values, rest), f"{title}, {word}"), note)
+        out[f"map_{word}"] = (heat_map(made, end.reduce(values, axis=rest), f"{title}, {word}"), note)
     for k, axis in enumerate(made.axes):
         others = tuple(i for i in range(values.ndim) if i != k)
         data = []
-        for number, (word, ends) in enumerate(ENDS.items()):
-            best = ends(values, others)
+        for number, (word, end) in enumerate(ENDS.items()):
+            best = end.reduce(values, axis=others)
             if axis.numeric:
                 data.append(line(_place(made, k), best, word, SERIES[number], mode="lines+markers"))
             else:
@@ -153,21 +147,6 @@ def _grid(made: Sweep, measure: Measure) -> Array:
         if value is not None:
             out[tuple(places[k][repr(point.values[axis.key])] for k, axis in enumerate(made.axes))] = value
     return out
-
-
-def _highest(values: Array, over: tuple[int, ...]) -> Array:
-    """Largest value over some axes; NaN where all are."""
-    filled = np.where(np.isnan(values), -np.inf, values).max(axis=over)
-    return np.where(np.isinf(filled), np.nan, filled)
-
-
-def _lowest(values: Array, over: tuple[int, ...]) -> Array:
-    """Smallest value over some axes; NaN where all are."""
-    return -_highest(-values, over)
-
-
-#: a figure may be one to raise or one to lower: both ends are shown
-ENDS: dict[str, Callable[[Array, tuple[int, ...]], Array]] = {"highest": _highest, "lowest": _lowest}
 
 
 def _place(made: Sweep, k: int) -> Any:

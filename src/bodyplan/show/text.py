@@ -57,6 +57,14 @@ def figure(value: float | None, unit: str = "", digits: int = 4, *, zeros: bool 
     return f"{text} {unit}".replace(" ", "\u00a0") if unit else text
 
 
+def elapsed(seconds: float) -> str:
+    """A time that something took, in the unit that reads best."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 3.0 * size:
+            return figure(seconds / size, unit, 3)
+    return figure(seconds, "s", 3)
+
+
 def percent(value: float | None) -> str:
     """A share as a percentage."""
     return figure(None if value is None else 100.0 * value, "%", 3, zeros=True)
