@@ -60,6 +60,26 @@ def test_a_local_cluster_and_a_point_that_ends_its_worker(tmp_path, monkeypatch,
     assert len(keys) == len(set(keys)) == len(reference)
 
 
+def test_another_client_of_the_user_does_not_get_in_the_way(processes, reference):
+    """A client made later, which dask takes for the default one, is busy all the while: the rows come without it."""
+    import threading
+
+    from distributed import Client
+
+    from bodyplan.search.payload import key_of, payload_of
+
+    address, _ = processes
+    payload, changes = payload_of(mission()), next(iter(reference))
+    done, waited = threading.Event(), []
+    with cluster.pool(scheduler=address) as workers, Client(address) as busy:
+        busy.loop.add_callback(lambda: waited.append(done.wait(60.0)))
+        found = list(workers.rows(payload, [(key_of(payload, changes, {}), changes)], True))
+        done.set()
+        busy.sync(busy.scheduler.identity)  # after the callback
+    assert waited == [True]
+    assert [(row.status, dict(row.figures)) for _, row in found] == [reference[changes]]
+
+
 def test_processes_started_apart_one_killed_in_the_middle(tmp_path, processes, reference):
     """A scheduler and two workers; one is killed after the second point. No point is lost, none is there twice, and
     the table is the one of any other run."""

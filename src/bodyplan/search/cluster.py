@@ -83,7 +83,8 @@ class Pool:
         if payload.files:
             sent = self._client.submit(replace, payload, key=f"bodyplan-mission-{payload.content}")
         waiting = iter(jobs.items())
-        done = distributed_().as_completed(with_results=True, raise_errors=False)
+        # in the client's own loop: the default is that of the latest client, which may be another one of the user's
+        done = distributed_().as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
         keys: dict[Any, str] = {}
 
         def give(most: int) -> None:
