@@ -2,9 +2,10 @@
 
 from bodyplan.fitting.angles import JointAngles
 from bodyplan.fitting.convergence import Convergence, ConvergenceRow, convergence
+from bodyplan.fitting.exact_length import ExactLength, exact_link_length
 from bodyplan.fitting.fits import Fit, Turning, fit
 from bodyplan.fitting.following import largest_distances
-from bodyplan.fitting.links import ExactLength, LinksFit, exact_link_length, links_on_curve
+from bodyplan.fitting.links import LinksFit, links_on_curve
 from bodyplan.fitting.mechanism import Mechanism, mechanism
 from bodyplan.fitting.rules import GAUSS_P, Bends, Rule, rule
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from bodyplan.arrays import Array, finite, number, whole
 from bodyplan.errors import InputError, Status, UnknownNameError
-from bodyplan.fitting.links import exact_link_length, links_on_curve
+from bodyplan.fitting.exact_length import exact_link_length
+from bodyplan.fitting.links import links_on_curve
 from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.concertina_claims import claims_of, notes_of
 from bodyplan.gaits.cycle import ExtensionCycle
