@@ -221,6 +221,6 @@ def test_version():
 def test_installed_command_runs():
     env = {**os.environ, "NO_COLOR": "1"}
     out = subprocess.run(
-        [sys.executable, "-m", "bodyplan.cli", "missions"], capture_output=True, text=True, env=env, check=True
+        [sys.executable, "-m", "bodyplan", "missions"], capture_output=True, text=True, env=env, check=True
     )
     assert "concertina" in out.stdout

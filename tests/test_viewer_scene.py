@@ -239,7 +239,7 @@ def test_view_refuses_what_it_cannot_show(busy: int) -> None:
 
 
 def test_control_c_ends_it() -> None:
-    command = [sys.executable, "-m", "bodyplan.cli", "view", "inching", "--no-browser", "--port", "0"]
+    command = [sys.executable, "-m", "bodyplan", "view", "inching", "--no-browser", "--port", "0"]
     # a suite that runs in the background ignores ctrl-C, and so would what it starts
     out = subprocess.Popen(
         command,
