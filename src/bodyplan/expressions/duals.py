@@ -9,13 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from bodyplan.arrays import Array
-from bodyplan.expressions.jets import DERIVATIVES, NUMPY_NAMES, ArrayMath
+from bodyplan.expressions.jets import DERIVATIVES, NUMPY_NAMES
 from bodyplan.expressions.parse import Node
 
-_ARRAYS = ArrayMath()
 _OPERATIONS = {NUMPY_NAMES.get(op, op): op for op in DERIVATIVES}
 
 
@@ -68,17 +65,16 @@ def rate_of(number: Any) -> Array | float:
 
 
 class DualMath:
-    """Dual numbers as the numbers of a jet; kinks of abs, min and max as in :class:`ArrayMath`, and so ``values``
-    remembers where an operation had no finite result."""
+    """Dual numbers as the numbers of a jet. ``values`` is the math of their values and rates."""
 
-    def __init__(self) -> None:
-        self.values = ArrayMath()
+    def __init__(self, values: Any) -> None:
+        self.values = values
 
     def __getattr__(self, name: str) -> Callable[[Any], Any]:
         def function(v: Any) -> Any:
             d = _dual(v)
-            f = getattr(np, name)(d.value)
-            first, _ = DERIVATIVES[_OPERATIONS[name]](_ARRAYS, d.value, f)
+            f = getattr(self.values, name)(d.value)
+            first, _ = DERIVATIVES[_OPERATIONS[name]](self.values, d.value, f)
             return Dual(f, first * d.rate)
 
         return function
@@ -90,25 +86,26 @@ class DualMath:
         if p in (0.0, 1.0):
             return 1.0 if p == 0.0 else v
         d = _dual(v)
-        return Dual(_ARRAYS.power(d.value, p), p * _ARRAYS.power(d.value, p - 1.0) * d.rate)
+        return Dual(self.values.power(d.value, p), p * self.values.power(d.value, p - 1.0) * d.rate)
 
     def arctan2(self, y: Any, x: Any) -> Any:
         a, b = _dual(y), _dual(x)
         r2 = a.value * a.value + b.value * b.value
-        return Dual(np.arctan2(a.value, b.value), (b.value * a.rate - a.value * b.rate) / r2)
+        return Dual(self.values.arctan2(a.value, b.value), (b.value * a.rate - a.value * b.rate) / r2)
 
     def step(self, v: Any) -> Any:
-        return _ARRAYS.step(_dual(v).value)
+        return self.values.step(_dual(v).value)
 
     def bend(self, v: Any) -> Any:
         return None
 
     def order(self, a: Any, b: Any) -> Any:
-        return _ARRAYS.order(_dual(a).value, _dual(b).value)
+        return self.values.order(_dual(a).value, _dual(b).value)
 
     def pick(self, order: Any, a: Any, b: Any, smooth: bool) -> Any:
         p, q = _dual(a), _dual(b)
-        return Dual(np.where(order, p.value, q.value), np.where(order, p.rate, q.rate))
+        pick = self.values.pick
+        return Dual(pick(order, p.value, q.value, smooth), pick(order, p.rate, q.rate, smooth))
 
     def cut(self, y: Any, x: Any, h: Any) -> Any:
         return h

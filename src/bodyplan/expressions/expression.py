@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array, BoolArray, finite
 from bodyplan.errors import InputError, UnknownNameError
-from bodyplan.expressions.duals import Dual, DualMath, rate_of
-from bodyplan.expressions.intervals import Interval, IntervalMath, interval
-from bodyplan.expressions.jets import ArrayMath, Jet, fold, pairs, run
+from bodyplan.expressions.jets import fold
 from bodyplan.expressions.parse import CONSTANTS, FUNCTIONS, Node, parse, shown
+
+if TYPE_CHECKING:
+    from bodyplan.expressions.compiled import Program, Tape
 
 
 class Expression:
@@ -96,19 +97,13 @@ class Expression:
 
         Raises InputError as :meth:`value`, and where a rate is not finite.
         """
-        ends = {f"{name}{end}": pair[end] for name, pair in ways.items() for end in (0, 1)}
-        flat = self._points(ends, [f"{name}{end}" for name in self._variables for end in (0, 1)])
-        shape = flat[0].shape if flat else ()
-        n = len(self._variables)
-        math = DualMath()
-        with np.errstate(all="ignore"):
-            variables = [Dual(value, rate) for value, rate in zip(flat[::2], flat[1::2], strict=True)]
-            last = run(self._tape, _seeds(variables, n), math)[-1]
-        rates = _dense(last, shape, n, rate_of)
+        from bodyplan.expressions.compiled import rates_program
+
+        flat = self._pairs(ways)
+        program = rates_program(self._tape, len(self._variables))
+        rates, culprit = self._numbers(program, flat, len(self._variables))
         good = np.isfinite(rates[0]) & np.isfinite(rates[1]).all(axis=-1) & np.isfinite(rates[2]).all(axis=(-2, -1))
-        if math.values.undefined is not None:
-            good &= ~math.values.undefined
-        self._check(flat[::2], good, math.values.culprit)
+        self._check(flat[::2], good, culprit)
         return rates
 
     def enclosure(self, **boxes: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array, Array]:
@@ -119,23 +114,32 @@ class Expression:
         is known: at a kink for the Hessian, at a pole or the edge of the domain for all. Where the formula
         is defined nowhere in a box, the value has the empty bounds (inf, -inf).
         """
-        ends = {f"{name}{end}": box[end] for name, box in boxes.items() for end in (0, 1)}
-        flat = self._points(ends, [f"{name}{end}" for name in self._variables for end in (0, 1)])
-        shape = flat[0].shape if flat else ()
-        n = len(self._variables)
-        math = IntervalMath()
-        with np.errstate(all="ignore"):
-            variables = [Interval(low, high) for low, high in zip(flat[::2], flat[1::2], strict=True)]
-            last = run(self._tape, _seeds(variables, n), math)[-1]
-        parts = []
-        for end, outwards in (("lo", -1.0), ("hi", 1.0)):
-            value, gradient, hessian = _dense(last, shape, n, partial(_end, end))
-            for part in (value, gradient, hessian):
-                wider = part + outwards * (1e-12 * np.where(np.isfinite(part), np.abs(part), 0.0) + 1e-300)
-                part[...] = np.where(np.isfinite(part), wider, outwards * np.inf)
-            value[np.broadcast_to(math.empty, shape)] = -outwards * np.inf
-            parts.append((value, gradient, hessian))
-        return tuple(np.stack(pair) for pair in zip(*parts, strict=True))  # type: ignore[return-value]
+        return self._intervals(self.bounds_tape, boxes, len(self._variables))
+
+    def extremes(self, **boxes: tuple[ArrayLike, ArrayLike]) -> Array:
+        """Bounds (2, ...) of the value over boxes: those of :meth:`enclosure`, for less."""
+        return self._intervals(self.range_tape, boxes, 0)[0]
+
+    @cached_property
+    def jet_tape(self) -> Tape:
+        """What kernels need for values and derivatives: :func:`bodyplan.expressions.tape_kernel.tape_jet`."""
+        from bodyplan.expressions.compiled import jet_program
+
+        return jet_program(self._tape, len(self._variables)).tape
+
+    @cached_property
+    def bounds_tape(self) -> Tape:
+        """What kernels need for bounds: :func:`bodyplan.expressions.tape_kernel.tape_bounds`."""
+        from bodyplan.expressions.compiled import bounds_program
+
+        return bounds_program(self._tape, len(self._variables), True).tape
+
+    @cached_property
+    def range_tape(self) -> Tape:
+        """What kernels need for bounds of the value: :func:`bodyplan.expressions.tape_kernel.tape_range`."""
+        from bodyplan.expressions.compiled import bounds_program
+
+        return bounds_program(self._tape, len(self._variables), False).tape
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Expression) and (self.text, self.variables) == (other.text, other.variables)
@@ -161,22 +165,52 @@ class Expression:
         if missing:
             raise InputError(f"Expression {shown(self._text)}: no value for {', '.join(missing)}.")
         given = [finite(arrays[name], f"Expression {shown(self._text)}, {name}") for name in names]
+        if len({a.shape for a in given}) == 1:
+            return given
         try:
             return list(np.broadcast_arrays(*given))
         except ValueError as error:
             shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(names, given, strict=True))
             raise InputError(f"Expression {shown(self._text)}: shapes do not broadcast: {shapes}.") from error
 
+    def _pairs(self, pairs: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> list[Array]:
+        """Two arrays of every variable, one variable after the other, broadcast to one shape."""
+        ends = {f"{name}{end}": pair[end] for name, pair in pairs.items() for end in (0, 1)}
+        return self._points(ends, [f"{name}{end}" for name in self._variables for end in (0, 1)])
+
     def _run(self, points: list[Array], n: int) -> tuple[tuple[Array, Array, Array], str]:
         """Value, gradient and Hessian in n variables (0: none), and the first operation that failed."""
-        math = ArrayMath()
-        with np.errstate(all="ignore"):
-            last = run(self._tape, _seeds(points, n), math)[-1]
+        from bodyplan.expressions.compiled import jet_program, value_program
+
+        make = jet_program if n else value_program
+        return self._numbers(make(self._tape, len(self._variables)), points, n)
+
+    def _numbers(self, program: Program, points: list[Array], n: int) -> tuple[tuple[Array, Array, Array], str]:
+        """Numbers of a program at points (...,): the first (...,), n (..., n) and n n (..., n, n) further ones; and the
+        first operation that failed."""
+        from bodyplan.expressions.tape_kernel import tape_numbers
+
         shape = points[0].shape if points else ()
-        value, gradient, hessian = _dense(last, shape, n, lambda p: p)
-        if math.undefined is not None:
-            value[np.broadcast_to(math.undefined, shape)] = np.nan
-        return (value, gradient, hessian), math.culprit
+        flat = np.stack([p.ravel() for p in points], axis=-1) if points else np.zeros((1, 0))
+        value, gradient, hessian = np.empty(len(flat)), np.empty((len(flat), n)), np.empty((len(flat), n * n))
+        node = tape_numbers(program.tape, flat, value, gradient, hessian)
+        culprit = program.sources[node] if node < len(program.sources) else ""
+        return (value.reshape(shape), gradient.reshape(*shape, n), hessian.reshape(*shape, n, n)), culprit
+
+    def _intervals(
+        self, tape: Tape, boxes: Mapping[str, tuple[ArrayLike, ArrayLike]], n: int
+    ) -> tuple[Array, Array, Array]:
+        """Bounds of a program's numbers over boxes: of the first (2, ...), n (2, ..., n) and n n (2, ..., n, n)
+        further ones."""
+        from bodyplan.expressions.tape_kernel import tape_intervals
+
+        flat = self._pairs(boxes)
+        shape = flat[0].shape if flat else ()
+        ends = np.stack([p.ravel() for p in flat], axis=-1) if flat else np.zeros((1, 0))
+        m = len(ends)
+        value, gradient, hessian = np.empty((2, m)), np.empty((2, m, n)), np.empty((2, m, n * n))
+        tape_intervals(tape, ends[:, ::2], ends[:, 1::2], value, gradient, hessian)
+        return value.reshape(2, *shape), gradient.reshape(2, *shape, n), hessian.reshape(2, *shape, n, n)
 
     def _check(self, points: list[Array], good: BoolArray, culprit: str) -> None:
         if good.all():
@@ -185,26 +219,3 @@ class Expression:
         at = ", ".join(f"{name} = {float(p[index])!r}" for name, p in zip(self._variables, points, strict=True))
         part = f" (because of {shown(culprit)})" if culprit else ""
         raise InputError(f"Expression {shown(self._text)}: not finite, or without derivatives, at {at}{part}.")
-
-
-def _seeds(variables: Sequence[Any], n: int) -> list[Jet]:
-    """The jets of the variables themselves: unit gradients."""
-    curved = (None,) * (n * (n + 1) // 2)
-    return [Jet(v, tuple(1.0 if i == j else None for j in range(n)), curved) for i, v in enumerate(variables)]
-
-
-def _dense(jet: Jet, shape: tuple[int, ...], n: int, part: Callable[[Any], Any]) -> tuple[Array, Array, Array]:
-    """The arrays of a jet; ``part`` maps a number of its kind to an array."""
-    value, gradient, hessian = np.empty(shape), np.zeros((*shape, n)), np.zeros((*shape, n, n))
-    value[...] = part(jet.value)
-    for i, g in enumerate(jet.gradient):
-        if g is not None:
-            gradient[..., i] = part(g)
-    for (i, j), h in zip(pairs(n), jet.hessian, strict=True):
-        if h is not None:
-            hessian[..., i, j] = hessian[..., j, i] = part(h)
-    return value, gradient, hessian
-
-
-def _end(end: str, number: Any) -> Any:
-    return getattr(interval(number), end)

@@ -1,8 +1,8 @@
 """Second-order forward-mode differentiation: value, gradient and Hessian carried through every operation.
 
-The rules are written once, for any kind of number: arrays give exact derivatives, intervals
-(:mod:`bodyplan.expressions.intervals`) give bounds of the derivatives over a box, dual numbers
-(:mod:`bodyplan.expressions.duals`) their rates along a way.
+The rules are written once, for any kind of number: arrays give exact derivatives, intervals bounds of the derivatives
+over a box, dual numbers (:mod:`bodyplan.expressions.duals`) their rates along a way. Symbols
+(:mod:`bodyplan.expressions.compiled`) write the rules down as programs for a kernel.
 """
 
 from __future__ import annotations
@@ -130,7 +130,8 @@ def run(tape: Sequence[Node], variables: Sequence[Jet], math: Math) -> list[Jet]
     for node in tape:
         args = [jets[i] for i in node.args]
         if node.op == "number":
-            jet = Jet(node.number, (None,) * n, (None,) * (n * (n + 1) // 2))
+            # a number of NumPy's: its divisions by 0 are infinite, not errors
+            jet = Jet(np.float64(node.number), (None,) * n, (None,) * (n * (n + 1) // 2))
         elif node.op == "variable":
             jet = variables[int(node.number)]
         else:
@@ -138,6 +139,13 @@ def run(tape: Sequence[Node], variables: Sequence[Jet], math: Math) -> list[Jet]
             jet = Jet(math.watch(node, jet.value), jet.gradient, jet.hessian)
         jets.append(jet)
     return jets
+
+
+def seeds(variables: Sequence[Number], n: int) -> list[Jet]:
+    """The jets of the variables themselves: unit gradients in n variables (0: values only)."""
+    curved = (None,) * (n * (n + 1) // 2)
+    one = np.float64(1.0)
+    return [Jet(v, tuple(one if i == j else None for j in range(n)), curved) for i, v in enumerate(variables)]
 
 
 def _apply(node: Node, args: list[Jet], math: Any) -> Jet:

@@ -1,7 +1,4 @@
-"""Interval arithmetic: bounds of a formula and of its derivatives over boxes.
-
-Bounds hold up to rounding (the caller widens the result a little); they are not the tightest ones.
-"""
+"""A formula's rules run on arrays and on intervals of arrays, node by node: what the kernels are held against."""
 
 from __future__ import annotations
 
@@ -11,9 +8,54 @@ from typing import Any
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
+from bodyplan.expressions import Expression
+from bodyplan.expressions.jets import ArrayMath, Jet, pairs, run, seeds
 from bodyplan.expressions.parse import Node
 
 _INF = float("inf")
+
+
+def jet_by_arrays(expression: Expression, points: list[Array]) -> tuple[Array, Array, Array, str]:
+    """Value (m,), nan where the formula is undefined, gradient (m, n) and Hessian (m, n, n), and the first node that is
+    not finite."""
+    math, n = ArrayMath(), len(points)
+    with np.errstate(all="ignore"):
+        last = run(expression._tape, seeds(points, n), math)[-1]
+    value, gradient, hessian = dense(last, points[0].shape, n, lambda number: number)
+    if math.undefined is not None:
+        value[np.broadcast_to(math.undefined, value.shape)] = np.nan
+    return value, gradient, hessian, math.culprit
+
+
+def bounds_by_arrays(expression: Expression, low: list[Array], high: list[Array]) -> tuple[Array, Array, Array]:
+    """Bounds in front, as :meth:`bodyplan.expressions.Expression.enclosure`."""
+    math, n, shape = IntervalMath(), len(low), low[0].shape
+    with np.errstate(all="ignore"):
+        variables = [Interval(a, b) for a, b in zip(low, high, strict=True)]
+        last = run(expression._tape, seeds(variables, n), math)[-1]
+        parts = []
+        for end, outwards in (("lo", -1.0), ("hi", 1.0)):
+            value, gradient, hessian = dense(last, shape, n, lambda number, end=end: getattr(interval(number), end))
+            for part in (value, gradient, hessian):
+                wider = part + outwards * (1e-12 * np.abs(part) + 1e-300)
+                part[...] = np.where(np.isfinite(part), wider, outwards * np.inf)
+            value[np.broadcast_to(math.empty, shape)] = -outwards * np.inf
+            parts.append((value, gradient, hessian))
+    value, gradient, hessian = (np.stack(pair) for pair in zip(*parts, strict=True))
+    return value, gradient, hessian
+
+
+def dense(jet: Jet, shape: tuple[int, ...], n: int, part: Callable[[Any], Any]) -> tuple[Array, Array, Array]:
+    """The arrays of a jet; ``part`` maps a number of its kind to an array."""
+    value, gradient, hessian = np.empty(shape), np.zeros((*shape, n)), np.zeros((*shape, n, n))
+    value[...] = part(jet.value)
+    for i, g in enumerate(jet.gradient):
+        if g is not None:
+            gradient[..., i] = part(g)
+    for (i, j), h in zip(pairs(n), jet.hessian, strict=True):
+        if h is not None:
+            hessian[..., i, j] = hessian[..., j, i] = part(h)
+    return value, gradient, hessian
 
 
 class Interval:
@@ -104,7 +146,8 @@ class IntervalMath:
         v = self._inside(v, -1.0, 1.0)
         return Interval(np.arccos(v.hi), np.arccos(v.lo))
 
-    def arctan2(self, y: Interval, x: Interval) -> Interval:
+    def arctan2(self, y: Any, x: Any) -> Interval:
+        y, x = interval(y), interval(x)
         corners = _hull([np.arctan2(b, a) for b in (y.lo, y.hi) for a in (x.lo, x.hi)])
         cut = _meets_cut(y, x)
         return Interval(np.where(cut, -np.pi, corners.lo), np.where(cut, np.pi, corners.hi))
