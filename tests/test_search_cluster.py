@@ -80,6 +80,34 @@ def test_another_client_of_the_user_does_not_get_in_the_way(processes, reference
     assert [(row.status, dict(row.figures)) for _, row in found] == [reference[changes]]
 
 
+def test_short_points_share_a_task_long_ones_do_not(processes, monkeypatch):
+    """What takes no time travels in tasks of several points, each point's row comes once; tasks get smaller at the
+    end, so that workers end together, and are of one point where a point is work enough."""
+    from bodyplan.search.payload import key_of, payload_of
+
+    address, _ = processes
+    payload = payload_of(mission())
+    jobs = [(key_of(payload, change, {}), change) for change in ((f"ground.width=-{k}.0",) for k in range(1, 61))]
+    sizes = []
+    with cluster.pool(scheduler=address) as workers:
+        whole = workers._client.map
+
+        def spied(function, *arguments, key):
+            sizes.extend(map(len, arguments[3]))
+            return whole(function, *arguments, key=key)
+
+        monkeypatch.setattr(workers._client, "map", spied)
+        for seconds in (0.001, 0.3, 2.0):
+            workers._seconds.extend([seconds] * cluster.LATEST)
+            sizes.clear()
+            found = list(workers.rows(payload, jobs, True))
+            assert sorted(key for key, _ in found) == sorted(key for key, _ in jobs)
+            rows_of = dict(found)
+            assert all(rows_of[key].status == "refused" and change[0] in rows_of[key].reason for key, change in jobs)
+            assert sum(sizes) == len(jobs) and sizes[-1] == 1
+            assert sizes[0] == {0.001: 15, 0.3: 3, 2.0: 1}[seconds]
+
+
 def test_processes_started_apart_one_killed_in_the_middle(tmp_path, processes, reference):
     """A scheduler and two workers; one is killed after the second point. No point is lost, none is there twice, and
     the table is the one of any other run."""

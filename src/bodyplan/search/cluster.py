@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from hashlib import sha256
 from time import monotonic
 from typing import Any
 
@@ -20,8 +21,14 @@ from bodyplan.search.measures import Bound
 from bodyplan.search.payload import Payload
 from bodyplan.search.point import Row, evaluate
 
-#: points under way for each worker: enough that none waits for the next one while a batch of them travels
+#: tasks under way for each worker: enough that none waits for the next one while a batch of them travels
 AHEAD = 8
+#: and at first, where nothing says yet how long a point takes
+FIRST = 2
+#: s of work in a task: one costs some 10 ms, whatever is in it, so that short points share one
+WORK = 1.0
+#: most points in a task, and how many of the latest points say how long the next ones take
+MOST_POINTS, LATEST = 16, 32
 #: s: how often to look whether workers have come or gone
 NEWS = 1.0
 #: s: how long a cluster may take to answer and to have a worker
@@ -54,6 +61,7 @@ class Pool:
 
     def __init__(self, client: Any) -> None:
         self._client = client
+        self._seconds: deque[float] = deque(maxlen=LATEST)
 
     def rows(
         self, payload: Payload, jobs: Iterable[Job], simulate: bool, bounds: Sequence[Bound] | None = None
@@ -82,54 +90,72 @@ class Pool:
         sent: Any = payload
         if payload.files:
             sent = self._client.submit(replace, payload, key=f"bodyplan-mission-{payload.content}")
-        waiting = iter(jobs.items())
+        waiting = deque(jobs.items())
         # in the client's own loop: the default is that of the latest client, which may be another one of the user's
         done = distributed_().as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
-        keys: dict[Any, str] = {}
+        under_way: dict[Any, list[str]] = {}
 
-        def give(most: int) -> None:
-            """Send up to so many points, all in one message: a message costs more than a point in it."""
-            batch = dict(itertools.islice(waiting, most))
-            if batch:
-                names = [f"bodyplan-point-{key}{again}" for key in batch]
-                arguments = [(__version__, sent, overrides, *how) for overrides in batch.values()]
-                futures = self._client.map(on_worker, *map(list, zip(*arguments, strict=True)), key=names)
-                keys.update(zip(futures, batch, strict=True))
+        def give(most: int, workers: int) -> None:
+            """Send up to so many tasks, all in one message: a message costs more than a task in it."""
+            tasks: list[list[tuple[str, tuple[str, ...]]]] = []
+            while waiting and len(tasks) < most:
+                tasks.append([waiting.popleft() for _ in range(self._size(len(waiting), workers))])
+            if tasks:
+                points = [[key for key, _ in task] for task in tasks]
+                arguments = [(on_worker, __version__, sent, [changes for _, changes in task], *how) for task in tasks]
+                names = [f"bodyplan-points-{sha256('-'.join(keys).encode()).hexdigest()}{again}" for keys in points]
+                futures = self._client.map(in_turn, *map(list, zip(*arguments, strict=True)), key=names)
+                under_way.update(zip(futures, points, strict=True))
                 done.update(futures)
 
         try:
-            room, asked = self._room(), monotonic()
-            give(room)
-            for found in done.batches():
+            workers, asked = self._workers(), monotonic()
+            give((AHEAD if self._seconds else FIRST) * workers, workers)
+            for batch in done.batches():
+                found = [(keys := under_way.pop(future), _rows_of(future, rows, len(keys))) for future, rows in batch]
+                self._seconds.extend(row.seconds for _, rows in found for row in rows if row.status != "lost")
                 if monotonic() - asked > NEWS:
-                    room, asked = self._room(), monotonic()
-                if len(keys) - len(found) <= room // 2:
-                    give(room - (len(keys) - len(found)))
-                for future, result in found:
-                    yield keys.pop(future), _row_of(future, result)
+                    workers, asked = self._workers(), monotonic()
+                if len(under_way) <= AHEAD * workers // 2:
+                    give(AHEAD * workers - len(under_way), workers)
+                for keys, rows in found:
+                    yield from zip(keys, rows, strict=True)
         finally:
-            self._client.cancel(list(keys))
+            self._client.cancel(list(under_way))
 
-    def _room(self) -> int:
-        """Points that may be under way with the workers that there are now."""
-        return AHEAD * max(1, len(self._client.scheduler_info(-1)["workers"]))
+    def _size(self, left: int, workers: int) -> int:
+        """Points in the next task: what makes up its work, and fewer at the end, where workers must end together."""
+        mean = sum(self._seconds) / len(self._seconds) if self._seconds else WORK
+        return max(1, min(int(WORK / max(mean, 1e-9)), left // (2 * workers), MOST_POINTS))
+
+    def _workers(self) -> int:
+        """Workers that there are now, at least one."""
+        return max(1, len(self._client.scheduler_info(-1)["workers"]))
 
 
-def _row_of(future: Any, result: Any) -> Row:
+def _rows_of(future: Any, result: Any, count: int) -> list[Row]:
+    """The rows of a task of ``count`` points."""
     if future.status == "finished":
-        row: Row = result
-        return row
+        rows: list[Row] = result
+        return rows
     if future.status != "error":
         raise BodyplanError("the cluster has gone; what is finished is kept, and the same command goes on.")
     error = result[1]
     if isinstance(error, distributed_().KilledWorker):
-        return Row("lost", LOST)
+        return [Row("lost", LOST)] * count
     if isinstance(error, BodyplanError):
         raise error
     raise BodyplanError(
         f"the workers cannot run bodyplan ({type(error).__name__}: {error}); they need the same bodyplan and Python as "
         "this process."
     ) from error
+
+
+def in_turn(
+    one: Callable[..., Row], version: str, payload: Payload, changes: Sequence[Sequence[str]], *how: Any
+) -> list[Row]:
+    """What ``one`` makes of several points."""
+    return [one(version, payload, overrides, *how) for overrides in changes]
 
 
 def on_worker(
