@@ -14,7 +14,7 @@ sideways slip. Where a wheel stands on an edge of the ground, p is where the edg
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -60,79 +60,40 @@ class Rates:
 
 def rates(ground: Terrain, found: Contacts, carried: Carried) -> Rates:
     """Rates of contacts that were found at the places of ``carried``."""
-    c = carried
+    from bodyplan.gaits.carry.rates_kernel import ROLLED, SMOOTH, accelerations, rollings, velocities
+
+    c, count = carried, len(found.phi)
     # what does not touch has no rates
     found = replace(found, radius=np.where(found.outcome == TOUCHES, found.radius, np.nan))
-    R = found.radius
-    sine, cosine = np.sin(found.phi)[:, None], np.cos(found.phi)[:, None]
-    u, t = sine * c.ahead + cosine * c.down, cosine * c.ahead - sine * c.down
-    smooth = _on_smooth(ground, found, c, u, t)
+    ways, contacts = np.concatenate([getattr(c, f.name) for f in fields(Carried)], axis=1), _rows(found)
+    of_contact, point, third = np.empty((count, SMOOTH)), np.empty((count, 2)), np.zeros((count, 2, 2))
+    velocities(ways, contacts, JUMPS, of_contact, point)
+    good = np.isfinite(point).all(axis=1)
+    third[good] = ground.field_hessian_rate(*found.point[good, :2].T, *point[good].T)
+    accelerations(ways, contacts, third, of_contact)
     if found.corner.any():
         edge = np.flatnonzero(found.corner)
-        for mine, other in zip(smooth, _on_edge(ground, found, c, u, t, edge), strict=True):
-            mine[edge] = other
-    angle, radius, angle_rate, radius_rate = smooth
-    # along the wheel's way: the material of a wheel that does not spin
-    u_dot = np.cross(c.spin, u) + angle[:, None] * t
-    t_dot = np.cross(c.spin, t) - angle[:, None] * u
-    arm = R[:, None] * u
-    plain = c.velocity + np.cross(c.spin, arm)
-    plain_dot = c.acceleration + np.cross(c.gain, arm) + np.cross(c.spin, radius[:, None] * u + R[:, None] * u_dot)
-    rolling = np.sum(plain * t, axis=1) / R
-    rolling_rate = (np.sum(plain_dot * t + plain * t_dot, axis=1) - rolling * radius) / R
-    left = np.cross(found.normal, t)
-    left /= np.linalg.norm(left, axis=1, keepdims=True)
-    slip = np.sum((plain + radius[:, None] * u) * left, axis=1)
-    point = plain + radius[:, None] * u + (R * angle)[:, None] * t
-    return Rates(angle, angle_rate, radius, radius_rate, rolling, rolling_rate, slip, point)
+        of_contact[edge] = np.stack(_on_edge(ground, found, c, edge), axis=1)
+    of_wheel = np.empty((count, ROLLED))
+    rollings(ways, contacts, of_contact, of_wheel)
+    angle, radius, angle_rate, radius_rate = of_contact.T
+    rolling, rolling_rate, slip = of_wheel[:, :3].T
+    return Rates(angle, angle_rate, radius, radius_rate, rolling, rolling_rate, slip, of_wheel[:, 3:])
 
 
-def _on_smooth(ground: Terrain, found: Contacts, c: Carried, u: Array, t: Array) -> tuple[Array, Array, Array, Array]:
-    """phi', R', phi'', R'' where the ground has a tangent."""
-    R, H = found.radius, found.hessian
-    # any multiple of N serves; this one has z = 1, where the ground is not upright
-    upright = np.where(found.corner | (found.normal[:, 2] <= 0.0), 1.0, found.normal[:, 2])
-    N = found.normal / upright[:, None]
-    with np.errstate(all="ignore"):
-        Nu = np.sum(N * u, axis=1)
-        along = _times(H, t)  # H t, with z = 0
-        bend = np.sum(along * t, axis=1)
-        stiff = np.where(found.slack > JUMPS, Nu + R * bend, np.nan)
-        w, g = c.spin, c.gain
-        plain = c.velocity + np.cross(w, R[:, None] * u)
-        radius = -np.sum(N * plain, axis=1) / Nu
-        a = plain + radius[:, None] * u
-        angle = (np.sum(N * np.cross(w, t), axis=1) - np.sum(along * a, axis=1)) / stiff
-        p = a + (R * angle)[:, None] * t
-        N_dot = -_times(H, p)
-        u_dot, t_dot = np.cross(w, u) + angle[:, None] * t, np.cross(w, t) - angle[:, None] * u
-        # p'' but for R'' u and R phi'' t
-        rest = (
-            c.acceleration
-            + 2.0 * radius[:, None] * u_dot
-            + R[:, None] * (np.cross(g, u) + np.cross(w, u_dot) + angle[:, None] * t_dot)
-        )
-        radius_rate = -(np.sum(N_dot * p, axis=1) + np.sum(N * rest, axis=1)) / Nu
-        b = rest + radius_rate[:, None] * u
-        third = np.zeros_like(H)
-        good = np.isfinite(p).all(axis=1)
-        third[good] = ground.field_hessian_rate(*found.point[good, :2].T, *p[good, :2].T)
-        turning = np.cross(g, t) + np.cross(w, t_dot) - angle[:, None] * u_dot
-        angle_rate = (
-            np.sum(N * turning, axis=1)
-            + 2.0 * np.sum(N_dot * t_dot, axis=1)
-            - np.sum(_times(third, p) * t, axis=1)
-            - np.sum(along * b, axis=1)
-        ) / stiff
-    return angle, radius, angle_rate, radius_rate
+def _rows(found: Contacts) -> Array:
+    """Contacts (n, 9) as kernels take them."""
+    bends = found.hessian.reshape(-1, 4)[:, [0, 1, 3]]
+    ends = [found.phi[:, None], found.radius[:, None], found.normal, bends, found.slack[:, None]]
+    return np.concatenate(ends, axis=1)
 
 
-def _on_edge(
-    ground: Terrain, found: Contacts, c: Carried, u: Array, t: Array, edge: IntArray
-) -> tuple[Array, Array, Array, Array]:
+def _on_edge(ground: Terrain, found: Contacts, c: Carried, edge: IntArray) -> tuple[Array, Array, Array, Array]:
     """phi', R', phi'', R'' of wheels ``edge`` (k,) on edges of the ground, whose points satisfy h = 0, k(x, y) = 0 and
     e . (p - c) = 0."""
-    R, u, t, e = found.radius[edge], u[edge], t[edge], c.axle[edge]
+    R, e = found.radius[edge], c.axle[edge]
+    sine, cosine = np.sin(found.phi[edge])[:, None], np.cos(found.phi[edge])[:, None]
+    u, t = sine * c.ahead[edge] + cosine * c.down[edge], cosine * c.ahead[edge] - sine * c.down[edge]
     v, v_dot, w, g = c.velocity[edge], c.acceleration[edge], c.spin[edge], c.gain[edge]
     x, y = found.point[edge, 0], found.point[edge, 1]
     with np.errstate(all="ignore"):
@@ -185,11 +146,4 @@ def _solved(system: Array, right: Array, good: Array) -> Array:
     out = np.full(right.shape, np.nan)
     if good.any():
         out[good] = np.linalg.solve(system[good], right[good][..., None])[..., 0]
-    return out
-
-
-def _times(H: Array, v: Array) -> Array:
-    """(H v_xy, 0), (n, 3)."""
-    out = np.zeros_like(v)
-    out[:, :2] = np.einsum("nij,nj->ni", H, v[:, :2])
     return out
