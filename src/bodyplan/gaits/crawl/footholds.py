@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
 from bodyplan.ground.near import clearance_up_to
@@ -20,7 +22,7 @@ AROUND = 12
 EXACT, HOLLOW, SETTLES = 1e-10, 1e-2, 20
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Footholds:
     """Where a ball of ``radius`` m can stand on ``ground`` no steeper than ``max_slope`` rad, at ``nominal`` (2,) m or
     as near to it as can be within ``search`` m.
@@ -33,6 +35,16 @@ class Footholds:
     radius: float
     max_slope: float
     search: float
+    _middle: Judged | None = field(init=False, default=None)
+
+    @classmethod
+    def look_ahead(cls, several: Sequence[Footholds]) -> None:
+        """Judge the middles of footholds on one ground at once: most often a foot stands there."""
+        one = several[0]
+        tried, radii = np.array([spots.nominal for spots in several]), np.array([spots.radius for spots in several])
+        found = _judged(one.ground, tried, radii, one.max_slope, one.search)
+        for k, spots in enumerate(several):
+            spots._middle = found.of(k)
 
     @cached_property
     def first(self) -> tuple[Array, str]:
@@ -40,8 +52,9 @@ class Footholds:
         good: list[Array] = []
         steep: list[Array] = []
         # nearer ones come first, and most often the first of all will do
-        for tried in np.split(self._tried, [1, 1 + DIRECTIONS]):
-            centres, stands, roomy = self._judged(tried)
+        for k, tried in enumerate(np.split(self._tried, [1, 1 + DIRECTIONS])):
+            known = self._middle if k == 0 else None
+            centres, stands, roomy, _ = known or self._judged(tried)
             if roomy.any():
                 return centres[roomy.argmax()], ""
             good += [centres[stands][:1]]
@@ -54,7 +67,7 @@ class Footholds:
     @cached_property
     def all(self) -> Array:
         """All centres (k, 3) m, the best first."""
-        centres, stands, roomy = self._judged(self._tried)
+        centres, stands, roomy, _ = self._judged(self._tried)
         return np.concatenate([centres[roomy], centres[stands & ~roomy]])
 
     @property
@@ -71,20 +84,39 @@ class Footholds:
         why = f"the ground is steeper than {np.degrees(self.max_slope):.3g} deg, or an edge, {_where(self.search)}"
         return why + ("" if self.search > 0.0 else '; foothold = "search" looks around')
 
-    def _judged(self, tried: Array) -> tuple[Array, BoolArray, BoolArray]:
-        """Centres (k, 3) m of balls at those of ``tried`` (n, 2) that have ground below them, which of these can stand,
-        and which have room there (all, without a search)."""
-        tried = tried[_on(self.ground, tried)] if len(tried) else tried
-        if not len(tried):
-            return np.zeros((0, 3)), np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-        normals = self.ground.normal(tried)
-        centres, stands = _settled(self.ground, tried, normals, self.radius)
-        flat = np.arccos(np.clip(normals[:, 2], -1.0, 1.0)) <= self.max_slope + EXACT
-        good = stands & flat
-        roomy = good.copy()
-        if self.search > 0.0 and good.any():
-            roomy[good] = _roomy(self.ground, centres[good], self.radius, self.max_slope)
-        return centres, good, roomy
+    def _judged(self, tried: Array) -> Judged:
+        return _judged(self.ground, tried, np.full(len(tried), self.radius), self.max_slope, self.search)
+
+
+class Judged(NamedTuple):
+    """Centres (k, 3) m of balls where there is ground below them, which of these can ``stand``, which have ``room``
+    there (all, without a search), and ``which`` (k,) of the places that were tried they are at."""
+
+    centres: Array
+    stand: BoolArray
+    room: BoolArray
+    which: IntArray
+
+    def of(self, which: int) -> Judged:
+        """Those at one of the places."""
+        mine = self.which == which
+        return Judged(*(part[mine] for part in self))
+
+
+def _judged(ground: Ground, tried: Array, radii: Array, max_slope: float, search: float) -> Judged:
+    """Balls with ``radii`` (n,) m at ``tried`` (n, 2) m."""
+    which = np.flatnonzero(_on(ground, tried)) if len(tried) else np.zeros(0, dtype=np.int64)
+    if not len(which):
+        return Judged(np.zeros((0, 3)), np.zeros(0, dtype=bool), np.zeros(0, dtype=bool), which)
+    tried, radii = tried[which], radii[which]
+    normals = ground.normal(tried)
+    centres, stands = _settled(ground, tried, normals, radii)
+    flat = np.arccos(np.clip(normals[:, 2], -1.0, 1.0)) <= max_slope + EXACT
+    good = stands & flat
+    roomy = good.copy()
+    if search > 0.0 and good.any():
+        roomy[good] = _roomy(ground, centres[good], radii[good], max_slope)
+    return Judged(centres, good, roomy, which)
 
 
 def _where(search: float) -> str:
@@ -107,37 +139,37 @@ def _on(ground: Ground, points: Array) -> BoolArray:
     return np.ones(len(points), dtype=bool)
 
 
-def _settled(ground: Ground, points: Array, normals: Array, radius: float) -> tuple[Array, BoolArray]:
-    """Centres (k, 3) of balls on the ground at ``points`` (k, 2), and which of them touch nothing else: a ball in a
-    hollow that is hardly narrower than itself is moved out of it."""
-    begun = np.concatenate([points, ground.height(points)[:, None]], axis=1) + radius * normals
-    centres, gap = begun.copy(), _gap(ground, begun, radius, 0.0)
+def _settled(ground: Ground, points: Array, normals: Array, radii: Array) -> tuple[Array, BoolArray]:
+    """Centres (k, 3) of balls with ``radii`` (k,) on the ground at ``points`` (k, 2), and which of them touch nothing
+    else: a ball in a hollow that is hardly narrower than itself is moved out of it."""
+    begun = np.concatenate([points, ground.height(points)[:, None]], axis=1) + radii[:, None] * normals
+    centres, gap = begun.copy(), _gap(ground, begun, radii, 0.0)
     for _ in range(SETTLES):
-        inside = np.flatnonzero((gap < -EXACT) & (gap > -HOLLOW * radius))
+        inside = np.flatnonzero((gap < -EXACT) & (gap > -HOLLOW * radii))
         if not len(inside):
             break
         centres[inside] -= gap[inside, None] * normals[inside]
-        gap[inside] = _gap(ground, centres[inside], radius, 0.0)
+        gap[inside] = _gap(ground, centres[inside], radii[inside], 0.0)
     moved = np.linalg.norm(centres - begun, axis=1)
-    return centres, (gap >= -EXACT) & (moved <= 2.0 * HOLLOW * radius)
+    return centres, (gap >= -EXACT) & (moved <= 2.0 * HOLLOW * radii)
 
 
-def _gap(ground: Ground, centres: Array, radius: float, most: float) -> Array:
+def _gap(ground: Ground, centres: Array, radii: Array, most: Array | float) -> Array:
     """Clearance (k,) m of balls, up to ``most`` m; minus infinity beyond the edge of the ground."""
     there = _on(ground, centres[:, :2])
     out = np.full(len(centres), -np.inf)
-    out[there] = clearance_up_to(ground, centres[there], radius + most) - radius
+    out[there] = clearance_up_to(ground, centres[there], (radii + most)[there]) - radii[there]
     return out
 
 
-def _roomy(ground: Ground, centres: Array, radius: float, max_slope: float) -> BoolArray:
+def _roomy(ground: Ground, centres: Array, radii: Array, max_slope: float) -> BoolArray:
     """Which of balls at ``centres`` (k, 3) can rise with a radius of room at their sides, and have ground around them
     that is nowhere far below."""
-    above = centres + 2.0 * radius * np.array([0.0, 0.0, 1.0])
-    room = _gap(ground, above, radius, radius) >= radius * (1.0 - 1e-3)
-    around = centres[:, None, :2] + radius * _ways(AROUND)
+    above = centres + 2.0 * radii[:, None] * np.array([0.0, 0.0, 1.0])
+    room = _gap(ground, above, radii, radii) >= radii * (1.0 - 1e-3)
+    around = centres[:, None, :2] + radii[:, None, None] * _ways(AROUND)
     there = _on(ground, around.reshape(-1, 2)).reshape(around.shape[:2])
     depth = np.full(there.shape, np.inf)
-    lowest = np.broadcast_to(centres[:, 2:] - radius, there.shape)
+    lowest = np.broadcast_to((centres[:, 2] - radii)[:, None], there.shape)
     depth[there] = lowest[there] - ground.height(around[there])
-    return np.asarray(room & (depth <= radius * (np.tan(max_slope) + 0.5)).all(axis=1))
+    return np.asarray(room & (depth <= radii[:, None] * (np.tan(max_slope) + 0.5)).all(axis=1))

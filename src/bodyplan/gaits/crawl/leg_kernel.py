@@ -234,7 +234,20 @@ def place(T: Tables, P: Postures, targets: Array, guess: Array, q: Array, came: 
     for b in range(len(targets)):
         q[b] = guess
         for leg in range(legs):
-            came[b, leg] = placed(T, P, leg, q[b], guess, targets[b, leg], bent[leg], F, W)
+            target = targets[b, leg]
+            # most feet stand still in the body's axes while one of them swings
+            if b > 0 and same(target, targets[b - 1, leg]):
+                came[b, leg] = came[b - 1, leg]
+                for j in range(3):
+                    q[b, T.columns[leg, j]] = q[b - 1, T.columns[leg, j]]
+            else:
+                came[b, leg] = placed(T, P, leg, q[b], guess, target, bent[leg], F, W)
+
+
+@njit(cache=True, nogil=True)
+def same(a: Array, b: Array) -> bool:
+    """Whether two points (3,) are the same."""
+    return bool(a[0] == b[0] and a[1] == b[1] and a[2] == b[2])
 
 
 @njit(cache=True, nogil=True)

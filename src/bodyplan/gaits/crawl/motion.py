@@ -9,8 +9,9 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.crawl.holding import holding
-from bodyplan.gaits.crawl.planner import Plan, Planner, base_of, seen_from
+from bodyplan.gaits.crawl.planner import Plan, Planner
 from bodyplan.gaits.crawl.steps import blend
+from bodyplan.gaits.crawl.verdict import base_of, seen_from
 from bodyplan.motion import Claim, Motion
 from bodyplan.spatial import rotate
 from bodyplan.spatial.rotations import conjugate

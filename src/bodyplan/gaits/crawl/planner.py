@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,10 +15,10 @@ from bodyplan.errors import InputError, Status
 from bodyplan.gaits.crawl.footholds import Footholds
 from bodyplan.gaits.crawl.legs import Legs, stance_guess
 from bodyplan.gaits.crawl.shell import Shell, shell_of
-from bodyplan.gaits.crawl.steps import Course, Step, blend, clear_swing, clear_swings, swing_path
+from bodyplan.gaits.crawl.steps import Course, Step, clear_swing, clear_swings, first_swings, swing_path
 from bodyplan.gaits.crawl.sway_kernel import sways
+from bodyplan.gaits.crawl.verdict import Failure, Lookout
 from bodyplan.ground.base import Ground
-from bodyplan.spatial.rotations import conjugate, matrix_from_quaternion
 
 if TYPE_CHECKING:
     from bodyplan.gaits.crawl.gait import Crawl
@@ -28,17 +29,16 @@ SHARES = np.linspace(0.0, 1.0, 41)
 PLACES = np.linspace(0.0, 1.0, 9)
 #: weight of sway against the logarithms of the distances from the edges
 SWAY_COST = 0.5
-#: where a step is looked at for what links and body could touch: of the body's move, and of the swing
-MOVE, SWING = np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 33)
-_MOVED = blend(MOVE)[0]
 #: what is tried where they come too near: so many footholds and swings, the body higher by such shares
 SPOTS, SWINGS, RISES = 25, 12, (0.0, 0.06, 0.12, 0.2)
 #: a share of sway with which steps to come are guessed
 AHEAD = 0.4
 #: most steps of one plan: a mistyped time should not eat the machine
 MOST_STEPS = 20_000
-#: m of distances that rounding may change, and by which it makes a difference of none
-EXACT, TIE = 1e-9, 1e-12
+#: most steps that are planned at once, as if the first way of making each were good
+AT_ONCE = 16
+#: m of distances that rounding may change
+EXACT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +56,13 @@ class Plan:
     time: float = np.inf
 
 
-@dataclass(frozen=True)
-class _Failure:
-    """Why there is no step, and from which time s on. ``short`` m: by how much links or body come too near to anything,
-    0 where that is not why; ``elsewhere``: whether another foothold may help; ``made``: the step, where only later ones
-    may not be."""
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """A way of making a step after the body's pose ``before`` (6,), and what is wrong with it, if anything is."""
 
-    status: Status = Status.OK
-    reason: str = ""
-    time: float = np.inf
-    short: float = 0.0
-    elsewhere: bool = False
-    made: Step | None = None
+    step: Step
+    before: Array
+    failure: Failure | None
 
 
 @dataclass
@@ -92,13 +87,18 @@ class Planner:
     guess: Array = field(init=False)
     shell: Shell | None = field(init=False)
     needed: Array = field(init=False)
+    lookout: Lookout | None = field(init=False)
+    _spots: dict[int, Footholds] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         stance = self.offsets - [0.0, 0.0, self.height]
         q, _ = self.legs.place(stance[None], stance_guess(self.legs, stance))
         self.guess = q[0]
         self.shell = shell_of(self.legs)
-        self.needed = np.zeros(0) if self.shell is None else self.shell.needed(self.guess, self.clearance)
+        self.needed, self.lookout = np.zeros(0), None
+        if self.shell is not None:
+            self.needed = self.shell.needed(self.guess, self.clearance)
+            self.lookout = Lookout(self.legs, self.ground, self.shell, self.guess, self.needed)
 
     @property
     def step_time(self) -> float:
@@ -113,49 +113,120 @@ class Planner:
                 f"{MOST_STEPS} allowed: a slower walk, a longer cycle_time, or a shorter time."
             )
         count = len(self.legs)
-        feet, failure = np.zeros((count, 3)), _Failure()
+        feet, failure = np.zeros((count, 3)), Failure()
         for place, leg in enumerate(self.order):
-            feet[leg], why = self._footholds(leg, place - count).first
+            feet[leg], why = self._footholds(place - count).first
             if why:
                 reason = f"{self.legs.names[leg]} has no foothold to begin on: {why}"
-                failure = _Failure(Status.NO_CONTACT, reason, 0.0)
-        first, begun = self._before(self.order[-1], feet), feet
+                failure = Failure(Status.NO_CONTACT, reason, 0.0)
+        first, begun = self._before(feet), feet
         steps: list[Step] = []
-        while failure.status == Status.OK and len(steps) * self.step_time < until:
-            before = steps[-1].pose if steps else first
-            step = self._step(self.order[len(steps) % count], len(steps), feet, before)
-            if isinstance(step, _Failure):
-                failure = step
-            else:
+        total = math.ceil(until / self.step_time)
+        total += (total * self.step_time < until) - ((total - 1) * self.step_time >= until > 0.0)
+        before, at_once = first, AT_ONCE
+        while failure.status == Status.OK and len(steps) < total:
+            ways: list[_Way | None] = [*self._ahead(len(steps), feet, before, min(at_once, total - len(steps)))]
+            kept = 0
+            for way in ways or [None]:
+                step = self._step(len(steps), feet, before, way)
+                if not isinstance(step, Step):
+                    failure = step or failure
+                    break
                 steps.append(step)
-                feet = step.after
+                feet, before, kept = step.after, step.pose, kept + 1
+            # where the first ways are no good, less is planned at once
+            at_once = min(2 * at_once, AT_ONCE) if kept >= len(ways) else max(kept, 1)
         return Plan(self.legs, first, begun, tuple(steps), self.guess, failure.status, failure.reason, failure.time)
 
-    def _before(self, leg: int, feet: Array) -> Array:
-        """Pose (6,) of the body at the end of the step before the first, in which ``leg`` has come to its place among
-        ``feet`` (m, 3): so that a walk that repeats does so from the beginning."""
-        before = feet.copy()
-        spot, why = self._footholds(leg, -1 - len(self.legs)).first
+    def _before(self, feet: Array) -> Array:
+        """Pose (6,) of the body at the end of the step before the first, in which the last leg has come to its place
+        among ``feet`` (m, 3): so that a walk that repeats does so from the beginning."""
+        leg, before = self.order[-1], feet.copy()
+        spot, why = self._footholds(-1 - len(self.legs)).first
         before[leg] = feet[leg] if why else spot
         shape = clear_swing(self.ground, before[leg], feet[leg], self.lift, self.legs.legs[leg].radius)
         pose, _, _, _ = self._body(leg, -1, before, feet, shape or (self.lift, 1.0))
         return pose
 
-    def _step(self, leg: int, n: int, feet: Array, before: Array) -> Step | _Failure:
-        """Step ``n``, in which ``leg`` swings while the others stay at ``feet`` (m, 3), after the body's pose
-        ``before`` (6,). If links or body come too near to anything, other swings, footholds and heights of the body are
-        tried; if nothing helps, what comes nearest to it says why."""
-        spots = self._footholds(leg, n)
+    def _ahead(self, n: int, feet: Array, before: Array, count: int) -> list[_Way]:
+        """The first way of making each of at most ``count`` steps from step ``n`` on, after ``feet`` (m, 3) and the
+        body's pose ``before`` (6,); up to the first step for which that is none, for all but what links or body could
+        touch."""
+        numbers = range(n, n + count)
+        self._look_ahead(n, n + count)
+        legs = [self.order[k % len(self.legs)] for k in numbers]
+        stands = [feet]
+        for k, leg in zip(numbers, legs, strict=True):
+            spot, why = self._footholds(k).first
+            if why:
+                break
+            after = stands[-1].copy()
+            after[leg] = spot
+            stands.append(after)
+        steps: list[Step] = []
+        try:
+            for k, leg, swing in zip(numbers, legs, self._first_swings(stands, legs), strict=False):
+                if swing is None:
+                    break
+                step = self._posed(leg, k, stands[k - n], stands[k - n + 1], swing)
+                if isinstance(step, Failure):
+                    break
+                steps.append(step)
+            poses = [before, *(step.pose for step in steps)]
+            failures = self._verdicts(steps, n, poses[:-1])
+        except InputError:  # beyond the edge of the ground, perhaps in a step that will not be made
+            return []
+        return [_Way(*way) for way in zip(steps, poses, failures, strict=False)]
+
+    def _first_swings(self, stands: list[Array], legs: list[int]) -> Iterator[tuple[float, float] | None]:
+        """The first clear swing from each of some stances (m, 3) to the next, if there is one."""
+        radii = self.legs.radii
+        ends = [(a[j], b[j], radii[j]) for (a, b), j in zip(pairwise(stands), legs, strict=False)]
+        if not ends:
+            return
+        before, after, sizes = (np.array(part) for part in zip(*ends, strict=True))
+        try:
+            good = first_swings(self.ground, before, after, self.lift, sizes)
+        except InputError:  # beyond the edge of the ground
+            good = np.zeros(len(ends), dtype=bool)
+        for is_good, (start, end, radius) in zip(good, ends, strict=True):
+            yield (self.lift, 1.0) if is_good else clear_swing(self.ground, start, end, self.lift, radius)
+
+    def _verdicts(self, steps: Sequence[Step], n: int, before: Sequence[Array]) -> list[Failure | None]:
+        """What comes too near to anything in steps from step ``n`` on, after the body's poses ``before`` (6,)."""
+        if self.lookout is None or not steps:
+            return [None] * len(steps)
+        later = np.array([self._later(step, n + k) for k, step in enumerate(steps)])
+        return self.lookout.verdicts(steps, np.array(before), later)
+
+    def _step(self, n: int, feet: Array, before: Array, way: _Way | None) -> Step | Failure | None:
+        """Step ``n``, in which a leg swings while the others stay at ``feet`` (m, 3), after the body's pose ``before``
+        (6,), by the first ``way`` of :meth:`_ahead`; None where that begins elsewhere."""
+        if way is None:
+            return self._searched(n, feet, before, None)
+        if not np.array_equal(way.step.before, feet):
+            return None
+        failure = way.failure
+        if not np.array_equal(way.before, before):
+            (failure,) = self._verdicts([way.step], n, [before])
+        return way.step if failure is None else self._searched(n, feet, before, failure)
+
+    def _searched(self, n: int, feet: Array, before: Array, known: Failure | None) -> Step | Failure:
+        """Step ``n`` as in :meth:`_step`, the first way of which is ``known`` to fail, if it is. If links or body come
+        too near to anything, other swings, footholds and heights of the body are tried; if nothing helps, what comes
+        nearest to it says why."""
+        leg, spots = self.order[n % len(self.legs)], self._footholds(n)
         _, why = spots.first
         if why:
             begin = n * self.step_time
             at = f"{self.legs.names[leg]} finds no foothold at {begin + self.sway_time:.4g} s"
-            return _Failure(Status.NO_CONTACT, f"{at}: {why}", begin)
-        best: _Failure | None = None
+            return Failure(Status.NO_CONTACT, f"{at}: {why}", begin)
+        best: Failure | None = None
         for rise in RISES:
-            doubtful: _Failure | None = None
+            doubtful: Failure | None = None
             for spot in _spread(spots):
-                step = self._tried(leg, n, feet, before, spot, rise * self.height)
+                step = self._tried(leg, n, feet, before, spot, rise * self.height, known)
+                known = None
                 if isinstance(step, Step):
                     return step
                 if step.short == 0.0 and best is None and doubtful is None:
@@ -171,102 +242,81 @@ class Planner:
         assert best is not None
         return best
 
-    def _tried(self, leg: int, n: int, feet: Array, before: Array, spot: Array, rise: float) -> Step | _Failure:
-        """Step ``n`` to ``spot`` (3,) with the body ``rise`` m higher than usual."""
-        name, begin = self.legs.names[leg], n * self.step_time
-        lift_off = begin + self.sway_time
+    def _tried(
+        self, leg: int, n: int, feet: Array, before: Array, spot: Array, rise: float, known: Failure | None
+    ) -> Step | Failure:
+        """Step ``n`` to ``spot`` (3,) with the body ``rise`` m higher than usual, the first swing of which is ``known``
+        to fail, if it is."""
         after = feet.copy()
         after[leg] = spot
         radius = self.legs.legs[leg].radius
-        best: _Failure | None = None
+        best: Failure | None = None
         for swing in islice(clear_swings(self.ground, feet[leg], spot, self.lift, radius), SWINGS):
-            pose, margin, share, reached = self._body(leg, n, feet, after, swing, rise)
-            if not reached.all():
-                lost = self.legs.names[int(np.flatnonzero(~reached)[0])]
-                what = "its way" if lost == name else f"where {lost} stands"
-                reason = f"{what} is out of reach while {name} swings at {lift_off:.4g} s"
-                return best or _Failure(Status.OUT_OF_REACH, reason, begin)
-            if margin < self.margin - EXACT and self.gait.sway == "auto":
-                reason = (
-                    f"no sway gives {self.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
-                    f"most is {margin:.4g} m"
-                )
-                if len(self.legs) == 3:
-                    reason += " (two feet are no support: a crawl needs four legs)"
-                return best or _Failure(Status.TIPS_OVER, reason, begin)
-            touch_down = lift_off + self.swing_time
-            step = Step(leg, begin, lift_off, touch_down, pose, feet, after, *swing, margin, share)
-            failure, raising = self._touches(step, n, before)
+            step = self._posed(leg, n, feet, after, swing, rise)
+            if isinstance(step, Failure):
+                return best or step
+            failure = known or self._verdicts([step], n, [before])[0]
+            known = None
             if failure is None:
                 return step
             if best is None or failure.short < best.short:
                 best = failure
-            if not raising:
+            if not failure.raising:
                 break
-        reason = f"{name} cannot swing over the ground at {lift_off:.4g} s"
-        return best or _Failure(Status.BELOW_FLOOR, reason, begin)
+        at = n * self.step_time + self.sway_time
+        reason = f"{self.legs.names[leg]} cannot swing over the ground at {at:.4g} s"
+        return best or Failure(Status.BELOW_FLOOR, reason, n * self.step_time)
 
-    def _touches(self, step: Step, n: int, before: Array) -> tuple[_Failure | None, bool]:
-        """What comes too near to the ground, or to what, in a step after the body's pose ``before`` (6,) and, as far as
-        its foot stands there, in the steps after it; and whether a higher swing may help."""
-        shell = self.shell
-        if shell is None:
-            return None, False
-        leg, name = step.leg, self.legs.names[step.leg]
-        poses = np.concatenate(
-            [
-                before + _MOVED[:, None] * (step.pose - before),
-                np.broadcast_to(step.pose, (len(SWING), 6)),
-                self._later(step, n),
-            ]
-        )
-        feet = np.repeat(step.before[None], len(poses), axis=0)
-        feet[len(MOVE) : len(MOVE) + len(SWING), leg] = step.foot(SWING)[0]
-        feet[len(MOVE) + len(SWING) :] = step.after
-        base = base_of(poses)
-        q, placed = self.legs.place(seen_from(base, feet), self.guess)
-        frames = self.legs.robot.forward(q, base).array
-        spare = shell.gaps(self.ground, frames, self.needed) - self.needed
-        spare[~placed.all(axis=1)] = np.inf
-        first, last = len(MOVE), len(MOVE) + len(SWING)
-        mine = shell.owners == leg
-        when = f"while {name} swings at {step.lift_off:.4g} s"
-        # the first of those that only rounding tells apart
-        worst = spare[:last] <= spare[:last].min() + TIE
-        row, part = np.unravel_index(int(worst.argmax()), worst.shape)
-        short = -float(spare[row, part])
-        if short > EXACT:
-            if row < first:
-                when = f"at {step.begin + self.sway_time * float(MOVE[row]):.4g} s, before {name} swings"
-            what, wanted = shell.name(int(part)), float(self.needed[part])
-            reason = f"{what} comes within {wanted - short:.3g} m of the ground {when}, clearance wants {wanted:.3g} m"
-            raising = bool(mine[part] and first < row < last - 1)
-            elsewhere = bool(mine[part] and row > first)
-            return _Failure(Status.BELOW_FLOOR, reason, step.begin, short, elsewhere), raising
-        gap, _, names = shell.nearest_pair(frames[:last])
-        if gap < -EXACT:
-            reason = f"{names[0]} and {names[1]} would be in each other {when}"
-            return _Failure(Status.LINKS_CROSSING, reason, step.begin, -gap, True), False
-        # how this leg will stand, as far as that can be guessed
-        short = -float(spare[last:, mine].min(initial=np.inf))
-        if short > EXACT:
-            return _Failure(Status.BELOW_FLOOR, "", step.begin, short, True, step), False
-        return None, False
+    def _posed(
+        self, leg: int, n: int, feet: Array, after: Array, swing: tuple[float, float], rise: float = 0.0
+    ) -> Step | Failure:
+        """Step ``n`` by one ``swing`` (lift m, early), whatever links or body could touch."""
+        name, begin = self.legs.names[leg], n * self.step_time
+        lift_off = begin + self.sway_time
+        pose, margin, share, reached = self._body(leg, n, feet, after, swing, rise)
+        if not reached.all():
+            lost = self.legs.names[int(np.flatnonzero(~reached)[0])]
+            what = "its way" if lost == name else f"where {lost} stands"
+            reason = f"{what} is out of reach while {name} swings at {lift_off:.4g} s"
+            return Failure(Status.OUT_OF_REACH, reason, begin)
+        if margin < self.margin - EXACT and self.gait.sway == "auto":
+            reason = (
+                f"no sway gives {self.margin:.4g} m of margin while {name} swings at {lift_off:.4g} s, the "
+                f"most is {margin:.4g} m"
+            )
+            if len(self.legs) == 3:
+                reason += " (two feet are no support: a crawl needs four legs)"
+            return Failure(Status.TIPS_OVER, reason, begin)
+        return Step(leg, begin, lift_off, lift_off + self.swing_time, pose, feet, after, *swing, margin, share)
 
     def _later(self, step: Step, n: int) -> Array:
         """Guesses (k, 6) of the body's poses in the steps after step ``n`` until its leg swings again, with more and
         less sway."""
-        ways, plane = [], self.plane(step.after)
-        for k in range(1, len(self.legs)):
-            at, heading = self.course.at((n + k) * self.step_time)
-            swinging = self.order[(n + k) % len(self.legs)]
-            centroid = _others(step.after, swinging)[:, :2].mean(axis=0)
-            ways += [(*(at + share * (centroid - at)), heading) for share in (0.0, step.share, AHEAD)]
-        return self.over(plane, np.array(ways))
+        ways, feet = [], step.after[:, :2].sum(axis=0)
+        for k in range(n + 1, n + len(self.legs)):
+            at, heading = self.course.at(k * self.step_time)
+            way = (feet - step.after[self.order[k % len(self.legs)], :2]) / (len(self.legs) - 1) - at
+            ways += [(*(at + share * way), heading) for share in (0.0, step.share, AHEAD)]
+        return self.over(self.plane(step.after), np.array(ways))
 
-    def _footholds(self, leg: int, n: float) -> Footholds:
-        """Those of a foot that swings in step ``n``: below where the body will be in the middle of its stance, or near
-        there."""
+    def _footholds(self, n: int) -> Footholds:
+        """Those of the foot that swings in step ``n``: below where the body will be in the middle of its stance, or
+        near there."""
+        if n not in self._spots:
+            self._look_ahead(n, n + 1)
+        return self._spots[n]
+
+    def _look_ahead(self, first: int, last: int) -> None:
+        """Judge the footholds of steps from ``first`` up to ``last`` at once; those of steps before are done with."""
+        spots = {n: known for n, known in self._spots.items() if n >= first}
+        new = [n for n in range(first, last) if n not in spots]
+        spots |= {n: self._footholds_of(n) for n in new}
+        if new:
+            Footholds.look_ahead([spots[n] for n in new])
+        self._spots = spots
+
+    def _footholds_of(self, n: int) -> Footholds:
+        leg = self.order[n % len(self.legs)]
         at, heading = self.course.at((n + 0.5 * len(self.legs)) * self.step_time)
         c, s = np.cos(heading), np.sin(heading)
         x, y = self.offsets[leg, :2]
@@ -349,21 +399,3 @@ def _spread(spots: Footholds) -> Iterator[Array]:
 def _others(feet: Array, leg: int) -> Array:
     """(m - 1, 3): all feet but one."""
     return np.concatenate([feet[:leg], feet[leg + 1 :]])
-
-
-def base_of(poses: Array) -> Array:
-    """Base poses (T, 7) from x, y, z, roll, pitch, yaw (T, 6): R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    out = np.empty((len(poses), 7))
-    out[:, :3] = poses[:, :3]
-    (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * poses[:, 3:].T), np.sin(0.5 * poses[:, 3:].T)
-    out[:, 3] = cy * cp * cr + sy * sp * sr
-    out[:, 4] = cy * cp * sr - sy * sp * cr
-    out[:, 5] = cy * sp * cr + sy * cp * sr
-    out[:, 6] = sy * cp * cr - cy * sp * sr
-    return out
-
-
-def seen_from(base: Array, points: Array) -> Array:
-    """World points (T, m, 3) in the frames of ``base`` (T, 7)."""
-    back = matrix_from_quaternion(conjugate(base[:, 3:]))
-    return np.asarray(np.einsum("tij,tmj->tmi", back, points - base[:, None, :3]))

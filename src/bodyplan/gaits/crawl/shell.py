@@ -7,10 +7,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from bodyplan.arrays import Array, IntArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import InputError
 from bodyplan.gaits.crawl.legs import Legs
-from bodyplan.gaits.crawl.shell_kernel import nearest_slim, nearest_to_box, placed
+from bodyplan.gaits.crawl.shell_kernel import last_moved, nearest_slim, nearest_to_box, placed
 from bodyplan.ground.base import Ground
 from bodyplan.ground.field import Field
 from bodyplan.ground.near import clearance_up_to, segment_clearance_up_to
@@ -71,39 +71,47 @@ class Shell:
         usual = self.gaps(level, self.legs.robot.forward(stance[None]).array, np.full(len(self.parts), np.inf))[0]
         return np.asarray(np.minimum(keep, np.maximum(USUAL * usual - EXACT, 0.0)))
 
-    def gaps(self, ground: Ground, poses: Array, most: Array) -> Array:
+    def gaps(self, ground: Ground, poses: Array, most: Array, wanted: BoolArray | None = None) -> Array:
         """Gaps (S, k) m of all parts to the ground at poses (S, F, 7) of all frames, up to ``most`` (k,) m; minus
-        infinity beyond the edge of the ground."""
-        out = np.full((len(poses), len(self.parts)), -np.inf)
+        infinity beyond the edge of the ground. With ``wanted`` (S, k), only these; others are infinite or right."""
+        out = np.full((len(poses), len(self.parts)), np.inf)
         if self.slim:
+            count = len(self.slim)
             _, radii = self._skeletons
             radii = radii[list(self.slim)]
             ends = self._ends(poses, self.slim)
-            for rows in _on(ground, ends):
-                out[rows, : len(radii)] = (
-                    segment_clearance_up_to(ground, ends[rows], most[: len(radii)] + radii + EXACT) - radii
-                )
+            since, fresh = _moves(ends.reshape(len(poses), count, 6), None if wanted is None else wanted[:, :count])
+            off = _beyond(ground, ends[since == np.arange(len(poses))[:, None]], ends)
+            if off.any():  # what a part has is not what it had where another was off
+                since, fresh = np.broadcast_to(np.arange(len(poses))[:, None], since.shape), np.ones_like(fresh)
+            rows, parts = np.nonzero(fresh & ~off[:, None])
+            caps = (most[:count] + radii + EXACT)[parts]
+            out[rows, parts] = _segment_gaps(ground, ends[rows, parts], caps) - radii[parts]
+            out[:, :count] = np.take_along_axis(out[:, :count], since, axis=0)
+            out[off, :count] = -np.inf
         for j, k in enumerate(self.boxes, start=len(self.slim)):
-            frame = self.legs.robot.frame_index(self._contact(k).frame)
-            _, first, back = np.unique(poses[:, frame], axis=0, return_index=True, return_inverse=True)
-            out[:, j] = self._box_gaps(ground, k, poses[first], float(most[j]))[back.ravel()]
+            frame = int(self._frames[k])
+            since, fresh = _moves(poses[:, [frame]], None if wanted is None else wanted[:, [j]])
+            rows = np.flatnonzero(fresh[:, 0])
+            out[rows, j] = self._box_gaps(ground, k, poses[rows], float(most[j]))
+            out[:, j] = out[since[:, 0], j]
         return out
 
-    def nearest_pair(self, poses: Array) -> tuple[float, int, tuple[str, str]]:
-        """The smallest gap m between two shapes of the robot that are no neighbours, feet included, at which of the
-        poses (S, F, 7), and their names; infinite for a robot without such."""
+    def overlap(self, poses: Array, most: float) -> tuple[float, tuple[str, str]]:
+        """The smallest gap m below ``most`` m between two shapes of the robot that are no neighbours, feet included, at
+        poses (S, F, 7), and their names; ``most`` where none is smaller."""
         slim, boxed = self._pairs
         every = tuple(range(len(self.legs.robot.contacts)))
         ends, (_, radii) = self._ends(poses, every), self._skeletons
-        best, pair, when = nearest_slim(ends, radii, slim)
-        names = (self._contact(slim[pair, 0]).name, self._contact(slim[pair, 1]).name) if best < np.inf else ("", "")
+        best, pair, _ = nearest_slim(ends, radii, slim, most)
+        names = (self._contact(slim[pair, 0]).name, self._contact(slim[pair, 1]).name) if best < most else ("", "")
         for box, others in boxed:
             shape = self._contact(box)
-            at = np.ascontiguousarray(poses[:, self.legs.robot.frame_index(shape.frame)])
-            gap, other, sample = nearest_to_box(at, np.array(shape.start), np.array(shape.half), ends, radii, others)
+            at = np.ascontiguousarray(poses[:, self._frames[box]])
+            gap, other, _ = nearest_to_box(at, np.array(shape.start), np.array(shape.half), ends, radii, others, best)
             if gap < best:
-                best, when, names = gap, sample, (shape.name, self._contact(others[other]).name)
-        return float(best), int(when), names
+                best, names = gap, (shape.name, self._contact(others[other]).name)
+        return float(best), names
 
     @cached_property
     def _pairs(self) -> tuple[IntArray, list[tuple[int, IntArray]]]:
@@ -124,6 +132,12 @@ class Shell:
         return np.array(slim, dtype=np.int64).reshape(-1, 2), others
 
     @cached_property
+    def _frames(self) -> IntArray:
+        """(c,) of all contacts: indices of the frames that they are on."""
+        robot = self.legs.robot
+        return np.array([robot.frame_index(contact.frame) for contact in robot.contacts], dtype=np.int64)
+
+    @cached_property
     def _skeletons(self) -> tuple[Array, Array]:
         """Of all contacts: the ends (c, 2, 3) m of their middle lines in their frames, and the radii (c,) m."""
         contacts = self.legs.robot.contacts
@@ -140,7 +154,7 @@ class Shell:
 
     def _placed(self, poses: Array, which: tuple[int, ...], local: Array) -> Array:
         """World points (S, k, p, 3) of points (k, p, 3) in the frames of contacts."""
-        frames = np.array([self.legs.robot.frame_index(self._contact(k).frame) for k in which], dtype=np.int64)
+        frames = self._frames[list(which)]
         out = np.empty((len(poses), *local.shape))
         placed(poses, frames, local, out)
         return out
@@ -152,7 +166,10 @@ class Shell:
         places, out = self._placed(poses, (k,), local[None])[:, 0], np.full(len(poses), -np.inf)
         for rows in _on(ground, places):
             if curved:
-                out[rows] = clearance_up_to(ground, places[rows], most + EXACT).min(axis=1)
+                out[rows] = most + EXACT
+                near = rows[~_far(ground, places[rows], np.full(len(rows), most + EXACT))]
+                if len(near):
+                    out[near] = clearance_up_to(ground, places[near], most + EXACT).min(axis=1)
             else:
                 out[rows] = segment_clearance_up_to(ground, places[rows].reshape(len(rows), -1, 2, 3), most).min(axis=1)
         return out
@@ -162,6 +179,39 @@ class Shell:
 def shell_of(legs: Legs) -> Shell | None:
     """:meth:`Shell.of`, remembered."""
     return Shell.of(legs)
+
+
+def _moves(points: Array, wanted: BoolArray | None) -> tuple[IntArray, BoolArray]:
+    """Since which sample (S, k) parts with ``points`` (S, k, d) have been where they are, and where (S, k) that is of
+    samples that are ``wanted``."""
+    since: IntArray = np.empty(points.shape[:2], dtype=np.int64)
+    last_moved(points, since)
+    fresh = np.zeros(since.shape, dtype=bool)
+    rows, parts = np.nonzero(np.ones_like(fresh) if wanted is None else wanted)
+    fresh[since[rows, parts], parts] = True
+    return since, fresh
+
+
+def _segment_gaps(ground: Ground, ends: Array, caps: Array) -> Array:
+    """Clearances (n,) m of segments (n, 2, 3), up to ``caps`` (n,) m."""
+    out = caps.copy()
+    near = np.flatnonzero(~_far(ground, ends, caps))
+    if len(near):
+        out[near] = segment_clearance_up_to(ground, ends[near], caps[near])
+    return out
+
+
+def _far(ground: Ground, points: Array, caps: Array) -> BoolArray:
+    """Of convex shapes with corners ``points`` (n, p, 3), those known to be farther above the ground than ``caps`` (n,)
+    m: from bounds of its height around all of a shape."""
+    if not isinstance(ground, Field) or not len(points):
+        return np.zeros(len(points), dtype=bool)
+    low, high = points.min(axis=1), points.max(axis=1)
+    reach = np.maximum(caps, EXACT)[:, None]
+    edge_low, edge_high = ground.field_box
+    around = (np.clip(corner, edge_low, edge_high) for corner in (low[:, :2] - reach, high[:, :2] + reach))
+    top = ground.field_bounds(*around).z[1]
+    return np.asarray(low[:, 2] - top > reach[:, 0])
 
 
 def _edges(box: Contact) -> IntArray:
@@ -175,6 +225,17 @@ def _faces(box: Contact) -> Array:
     """Points (p, 3) of the faces of a box."""
     grid = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, SIDE)] * 3), axis=-1).reshape(-1, 3)
     return np.asarray(np.array(box.start) + grid[np.abs(grid).max(axis=1) == 1.0] * np.array(box.half))
+
+
+def _beyond(ground: Ground, moved: Array, ends: Array) -> BoolArray:
+    """Samples (S,) of points ``ends`` (S, k, 2, 3) some of which have no ground below them; ``moved`` (n, 2, 3) are all
+    of these once."""
+    out = np.zeros(len(ends), dtype=bool)
+    if not _has_ground(ground, moved):
+        out[:] = True
+        for rows in _on(ground, ends):
+            out[rows] = False
+    return out
 
 
 def _on(ground: Ground, points: Array) -> list[IntArray]:

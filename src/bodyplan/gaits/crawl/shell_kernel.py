@@ -32,10 +32,10 @@ def _moved(at: Array, v: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def nearest_slim(ends: Array, radii: Array, pairs: IntArray) -> tuple[float, int, int]:
-    """The smallest gap m of ``pairs`` (n, 2) of capsules with ``ends`` (S, c, 2, 3) and ``radii`` (c,), which pair that
-    is and in which sample; infinite without pairs."""
-    best, which, when = np.inf, 0, 0
+def nearest_slim(ends: Array, radii: Array, pairs: IntArray, most: float) -> tuple[float, int, int]:
+    """The smallest gap m below ``most`` m of ``pairs`` (n, 2) of capsules with ``ends`` (S, c, 2, 3) and ``radii``
+    (c,), which pair that is and in which sample; ``most`` where no gap is smaller."""
+    best, which, when = most, 0, 0
     for k in range(len(pairs)):
         i, j = pairs[k]
         for s in range(len(ends)):
@@ -52,11 +52,12 @@ def nearest_slim(ends: Array, radii: Array, pairs: IntArray) -> tuple[float, int
 
 @njit(cache=True, nogil=True)
 def nearest_to_box(
-    poses: Array, middle: Array, half: Array, ends: Array, radii: Array, slim: IntArray
+    poses: Array, middle: Array, half: Array, ends: Array, radii: Array, slim: IntArray, most: float
 ) -> tuple[float, int, int]:
-    """The smallest gap m of a box, with ``half`` sizes (3,) around ``middle`` (3,) in a frame with ``poses`` (S, 7), to
-    the ``slim`` (k,) among capsules as in :func:`nearest_slim`, which of these that is and in which sample."""
-    best, which, when = np.inf, 0, 0
+    """The smallest gap m below ``most`` m of a box, with ``half`` sizes (3,) around ``middle`` (3,) in a frame with
+    ``poses`` (S, 7), to the ``slim`` (k,) among capsules as in :func:`nearest_slim`, which of these that is and in
+    which sample."""
+    best, which, when = most, 0, 0
     local = np.empty((2, 3))
     back = np.empty(7)
     back[:3] = 0.0
@@ -81,6 +82,20 @@ def nearest_to_box(
             if gap < best:
                 best, which, when = gap, k, s
     return best, which, when
+
+
+@njit(cache=True, nogil=True)
+def last_moved(points: Array, out: IntArray) -> None:
+    """Of parts with ``points`` (S, c, d): since which sample ``out`` (S, c) each has been where it is."""
+    for s in range(len(points)):
+        for c in range(points.shape[1]):
+            out[s, c] = s
+            if s > 0:
+                for i in range(points.shape[2]):
+                    if points[s, c, i] != points[s - 1, c, i]:
+                        break
+                else:
+                    out[s, c] = out[s - 1, c]
 
 
 @njit(cache=True, nogil=True)

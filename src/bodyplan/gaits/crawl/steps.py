@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError
+from bodyplan.gaits.crawl import swing_kernel
 from bodyplan.ground.base import Ground
 from bodyplan.ground.near import clearance_up_to
 
@@ -18,10 +22,11 @@ PLACES = 49
 KEEP = 0.4
 #: how a swing is raised where the ground is in its way, and how often; and how early it may rise before a step
 RAISE, TRIES, EARLY = 1.3, 14, (1.0, 0.6, 0.35)
-#: how long a step up that rises early waits before it goes along, as a share of what it is early by
-WAIT = 0.6
 #: m of distances that rounding may change
 EXACT = 1e-9
+#: where a swing is tried, and a hump of height 1 there
+INSIDE = np.linspace(0.0, 1.0, PLACES)[1:-1]
+_HUMP = 64.0 * (INSIDE * (1.0 - INSIDE)) ** 3
 
 
 @dataclass(frozen=True)
@@ -39,11 +44,11 @@ class Course:
         turn = self.yaw_rate * t
         # integral of the rotation by yaw_rate: t sinc and its partner, regular at no turn
         half = 0.5 * turn
-        size = t * float(np.sinc(half / np.pi))
+        size = t * (math.sin(half) / half if half else 1.0)
         way = self.heading + half
-        c, s = np.cos(way), np.sin(way)
-        vx, vy = self.velocity
-        return np.array(self.start) + size * np.array([c * vx - s * vy, s * vx + c * vy]), self.heading + turn
+        c, s = math.cos(way), math.sin(way)
+        (vx, vy), (x, y) = self.velocity, self.start
+        return np.array([x + size * (c * vx - s * vy), y + size * (s * vx + c * vy)]), self.heading + turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,44 +75,38 @@ class Step:
         return swing_path(self.before[self.leg], self.after[self.leg], self.lift, self.early, tau)
 
 
-def swing_path(start: Array, end: Array, lift: float, early: float, tau: Array) -> tuple[Array, Array, Array]:
-    """Place, velocity and acceleration (S, 3) by tau (S,) in [0, 1] of a foot on its way from ``start`` to ``end``.
+def swing_path(start: Array, end: Array, lift: Any, early: Any, tau: Array) -> tuple[Array, Array, Array]:
+    """Place, velocity and acceleration (..., 3) by tau (...,) in [0, 1] of feet on their ways from ``start`` to ``end``
+    (..., 3), ``lift`` and ``early`` (...,); all broadcast.
 
     With Q of :func:`blend` the path is Q(tau) along and in height, and ``lift`` 64 tau^3 (1 - tau)^3 above that: rates
     and accelerations are 0 at both ends. With ``early`` < 1 a foot that steps up rises within that share of tau, and
-    goes along in what is left of it from WAIT (1 - early) on; a step down is its mirror image.
+    goes along in what is left of it from ``swing_kernel.WAIT`` (1 - early) on; a step down is its mirror image.
     """
-    way = end - start
-    wait = WAIT * (1.0 - early)
-    windows = ((wait, 1.0), (0.0, early)) if way[2] >= 0.0 else ((0.0, 1.0 - wait), (1.0 - early, 1.0))
-    (along, left, *along_rates), (climb, fall, *climb_rates) = (_within(tau, *window) for window in windows)
-    hump, *hump_rates = (lift * v for v in _hump(tau))
-    # told from the nearer end, so that feet are exactly there
-    risen = np.stack([way[0] * along, way[1] * along, way[2] * climb + hump], axis=1)
-    landing = np.stack([way[0] * left, way[1] * left, way[2] * fall - hump], axis=1)
-    velocity, acceleration = (
-        np.stack([way[0] * a, way[1] * a, way[2] * c + h], axis=1)
-        for a, c, h in zip(along_rates, climb_rates, hump_rates, strict=True)
-    )
-    return np.where((tau > 0.5)[:, None], end - landing, start + risen), velocity, acceleration
+    shape = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], np.shape(lift), np.shape(early), tau.shape)
+    first, last = (np.ascontiguousarray(np.broadcast_to(v, (*shape, 3))).reshape(-1, 3) for v in (start, end))
+    high, soon, at = (np.array(np.broadcast_to(v, shape), np.float64).reshape(-1) for v in (lift, early, tau))
+    out = np.empty((math.prod(shape), 3, 3))
+    swing_kernel.swing(first, last, high, soon, at, out)
+    out = out.reshape(*shape, 3, 3)
+    return out[..., 0, :], out[..., 1, :], out[..., 2, :]
 
 
 def clear_swings(ground: Ground, start: Array, end: Array, lift: float, radius: float) -> Iterator[tuple[float, float]]:
     """(lift, early) of swings that take a ball of ``radius`` m over the ground, the least raised first.
 
     They keep off the ground by KEEP of ``lift``, but no farther than their ends have room at their sides."""
-    tau = np.linspace(0.0, 1.0, PLACES)[1:-1]
-    up = 2.0 * radius * np.array([0.0, 0.0, 1.0])
     try:
-        room = min(radius, float((ground.clearance(np.stack([start + up, end + up])) - radius).min()))
-        wanted = np.minimum(KEEP * lift * _hump(tau)[0], max(room, 0.0)) - EXACT
-        enough, height = radius + np.maximum(wanted, 0.0) + EXACT, lift
-        for _ in range(TRIES):
-            for early in EARLY:
-                place, _, _ = swing_path(start, end, height, early, tau)
-                if np.all(clearance_up_to(ground, place, enough) - radius >= wanted):
-                    yield height, early
-            height *= RAISE
+        wanted = _wanted(ground, start[None], end[None], lift, np.array([radius]))
+        tried = [(lift * RAISE**k, early) for k in range(TRIES) for early in EARLY]
+        # most often the first will do; then all ways of one height at once
+        begins = [0, 1, *range(len(EARLY), len(tried) + 1, len(EARLY))]
+        for first, last in pairwise(begins):
+            for shape, good in zip(
+                tried[first:last], _each_clear(ground, start, end, tried[first:last], radius, wanted), strict=True
+            ):
+                if good:
+                    yield shape
     except InputError:  # beyond the edge of the ground
         return
 
@@ -117,19 +116,43 @@ def clear_swing(ground: Ground, start: Array, end: Array, lift: float, radius: f
     return next(clear_swings(ground, start, end, lift, radius), None)
 
 
-def _within(tau: Array, first: float, last: float) -> tuple[Array, Array, Array, Array]:
-    """:func:`blend` from ``first`` to ``last``, 1 less it, and its derivatives by tau."""
-    span = last - first
-    done, rest = np.clip((tau - first) / span, 0.0, 1.0), np.clip((last - tau) / span, 0.0, 1.0)
-    value, rate, gain = blend(done)
-    return value, blend(rest)[0], rate / span, gain / span**2
+def first_swings(ground: Ground, starts: Array, ends: Array, lift: float, radii: Array) -> BoolArray:
+    """Whether (``lift``, 1) is the first of :func:`clear_swings` of each of some swings from ``starts`` to ``ends``
+    (k, 3), of balls with ``radii`` (k,) m. Raises InputError where any of them leaves the ground."""
+    wanted = _wanted(ground, starts, ends, lift, radii)
+    places, _, _ = swing_path(starts[:, None], ends[:, None], lift, EARLY[0], INSIDE)
+    return _clear(ground, places, radii, wanted)
 
 
-def _hump(tau: Array) -> tuple[Array, Array, Array]:
-    """64 tau^3 (1 - tau)^3, 1 in the middle, and its derivatives."""
-    part = tau * (1.0 - tau)
-    slope = 1.0 - 2.0 * tau
-    return 64.0 * part**3, 192.0 * part**2 * slope, 384.0 * part * (slope**2 - part)
+def _each_clear(
+    ground: Ground, start: Array, end: Array, shapes: list[tuple[float, float]], radius: float, wanted: Array
+) -> Iterator[bool]:
+    """Which of swings of some ``shapes`` (lift, early) are clear of the ground."""
+    lifts, earlies = np.array(shapes).T
+    places, _, _ = swing_path(start, end, lifts[:, None], earlies[:, None], INSIDE)
+    radii = np.full(len(shapes), radius)
+    try:
+        good = _clear(ground, places, radii, wanted)
+    except InputError:
+        # as far as they stay over the ground, one by one
+        for k in range(len(shapes)):
+            yield bool(_clear(ground, places[k : k + 1], radii[k : k + 1], wanted)[0])
+    else:
+        yield from good.tolist()
+
+
+def _wanted(ground: Ground, starts: Array, ends: Array, lift: float, radii: Array) -> Array:
+    """How far (k, INSIDE) m balls have to keep off the ground on their ways."""
+    up = 2.0 * radii[:, None, None] * np.array([0.0, 0.0, 1.0])
+    sides = np.stack([starts, ends], axis=1) + up
+    room = clearance_up_to(ground, sides, 2.0 * radii[:, None]).min(axis=1) - radii
+    return np.asarray(np.minimum(KEEP * lift * _HUMP, np.maximum(room, 0.0)[:, None]) - EXACT)
+
+
+def _clear(ground: Ground, places: Array, radii: Array, wanted: Array) -> BoolArray:
+    """Which of balls at ``places`` (k, INSIDE, 3) of their ways keep ``wanted`` m off the ground."""
+    enough = radii[:, None] + np.maximum(wanted, 0.0) + EXACT
+    return np.asarray(np.all(clearance_up_to(ground, places, enough) - radii[:, None] >= wanted, axis=1))
 
 
 def blend(tau: Array) -> tuple[Array, Array, Array]:
