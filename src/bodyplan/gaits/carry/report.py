@@ -31,6 +31,8 @@ PARALLEL = 1e-6
 TURNING, SCRUBBING = 1e-3, 1e-3
 #: rad: a contact angle that changes by more than its rates say, from sample to sample, has leapt
 LEAP = 0.05
+#: samples whose hull is measured at once
+_TOGETHER = 16
 
 
 def claims(wheels: Wheels, ok: BoolArray) -> Iterator[Claim]:
@@ -98,15 +100,27 @@ def facts(
 
 
 def _clearance(wheels: Wheels, land: Terrain, body: Carriage, ok: BoolArray) -> float | None:
-    """Smallest height (m) of points of the hull's lower faces over the ground."""
-    found = []
+    """Smallest height (m) of points of the hull's lower faces over the ground; None where there is none. Samples at
+    which bounds of the ground say that no point is as low as one that is known are left out."""
+    least, rows, edges = np.inf, np.flatnonzero(ok), land.field_box
     for box in hull.boxes(wheels.robot):
-        local = hull.lower_face(box)
-        for rows in np.array_split(np.flatnonzero(ok), max(1, int(ok.sum()) // 500)):
-            at = body.position[rows, None] + np.einsum("tij,pj->tpi", body.turn.matrix[rows], local)
-            flat = at.reshape(-1, 3)
-            found.append(float((flat[:, 2] - land.field_jet(flat[:, 0], flat[:, 1])[0]).min()))
-    return min(found, default=None)
+        local, turn = hull.lower_face(box), body.turn.matrix[rows]
+        centre = body.position[rows] + turn @ (np.array(box.start) - [0.0, 0.0, box.half[2]])
+        size = np.abs(turn[:, :, :2]) @ np.array(box.half[:2])
+        low, high = centre - size, centre + size
+        with np.errstate(invalid="ignore"):
+            bound = low[:, 2] - land.field_bounds(low[:, :2], high[:, :2]).z[1]
+        # nothing bounds the ground beyond its edges
+        inside = np.all((low[:, :2] >= edges[0]) & (high[:, :2] <= edges[1]), axis=1)
+        bound = np.where(inside & ~np.isnan(bound), bound, -np.inf)
+        order = np.argsort(bound, kind="stable")
+        for some in np.array_split(order, max(1, len(order) // _TOGETHER)):
+            if len(some) and bound[some[0]] > least:
+                break
+            at = (body.position[rows[some], None] + local @ np.swapaxes(turn[some], 1, 2)).reshape(-1, 3)
+            gap = at[:, 2] - land.field_jet(at[:, 0], at[:, 1])[0]
+            least = float(np.fmin.reduce(gap, initial=least))
+    return least if np.isfinite(least) else None
 
 
 def notes(
