@@ -9,6 +9,8 @@ from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
+from bodyplan.gaits.rectilinear.apart import Apart, all_apart
+from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.legs import elbow, leg_angles
 from bodyplan.gaits.rectilinear.moves import chord_of, swing_of
 from bodyplan.gaits.rectilinear.parts import overlap
@@ -29,8 +31,8 @@ REACH, COLLAPSED, ELBOWS, ANCHORS, LIMIT, CROSSING, TIPS = range(len(DEMANDS))
 class Bounds(NamedTuple):
     """What ``Demands`` says, for kernels: ``limits`` (2 N - 1, 2) rad are infinite and ``limited`` is False where there
     are none; ``link`` (P,), ``ends``, ``need`` and ``leg`` are those of ``Parts``, empty where they are thin; ``most``
-    m the largest need; ``weights`` (2 N - 1,) and ``shift`` m of the centre of mass; ``margin`` m NaN where it is not
-    asked for."""
+    m the largest need; ``apart``: when links are clear of each other whatever their parts; ``weights`` (2 N - 1,) and
+    ``shift`` m of the centre of mass; ``margin`` m NaN where it is not asked for."""
 
     links: Array
     ceiling: float
@@ -42,6 +44,7 @@ class Bounds(NamedTuple):
     need: Array
     leg: BoolArray
     most: float
+    apart: Apart
     tail: float
     weights: Array
     shift: float
@@ -51,9 +54,9 @@ class Bounds(NamedTuple):
 class Pose(NamedTuple):
     """Room for one pose: ``start``, ``offset`` and ``anchors`` (N, 2) m, ``origins`` (2 N, 2) m of all links with the
     tail link and the head link, cosine and sine ``turn`` (2 N, 2) of their angles, ``angles`` (2 N,) rad, ``short`` and
-    ``square`` (N - 1,) m^2 of the legs, and room (P, 9) for :func:`overlap`. What moves with no anchor that moves is
-    laid once for a move: ``fresh`` (2,) says that it is not there yet, nor the parts on it, ``moved`` (2 N,) which
-    links were laid last."""
+    ``square`` (N - 1,) m^2 of the legs, and room (2 N, 9) for :func:`all_apart` and (P, 9) for :func:`overlap`. What
+    moves with no anchor that moves is laid once for a move: ``fresh`` (2,) says that it is not there yet, nor the parts
+    on it, ``moved`` (2 N,) which links were laid last."""
 
     start: Array
     offset: Array
@@ -63,6 +66,7 @@ class Pose(NamedTuple):
     angles: Array
     short: Array
     square: Array
+    spans: Array
     work: Array
     fresh: BoolArray
     moved: BoolArray
@@ -83,19 +87,21 @@ def room_for(bounds: Bounds) -> Pose:
         np.zeros(2 * count),
         np.zeros(count - 1),
         np.zeros(count - 1),
+        np.zeros((2 * count, 9)),
         np.zeros((len(bounds.link), 9)),
         np.ones(2, dtype=np.bool_),
         np.ones(2 * count, dtype=np.bool_),
     )
 
 
-@njit(cache=True)
+@lean
 def lay(bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, pose: Pose) -> None:
     """The snake at ``tau`` of move ``m``; NaN where a leg does not reach."""
     links, count = bounds.links, before.shape[1]
     swing_of(before, after, lift, early, m, tau, pose.start, pose.offset)
     anchors, origins, turn, moved = pose.anchors, pose.origins, pose.turn, pose.moved
-    moved[:] = pose.fresh[0]
+    for k in range(2 * count):
+        moved[k] = pose.fresh[0]
     for i in range(count):
         anchors[i, 0] = pose.start[i, 0] + pose.offset[i, 0]
         anchors[i, 1] = pose.start[i, 1] + pose.offset[i, 1]
@@ -120,14 +126,17 @@ def lay(bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, 
     pose.fresh[0] = False
 
 
-@njit(cache=True)
+@lean
 def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: Array) -> None:
     """How far a pose is beyond every one of :data:`DEMANDS`, relative to links or as a share of pi, into ``out`` (7,);
     not positive where it is met, -inf where it is not asked for or the leg is not known. ``swinging`` (N,): the anchors
     that do not carry. What comes after a demand that it is beyond by more than ``enough`` is left at -inf."""
     links, legs = bounds.links, len(bounds.links) // 2
-    size = links.max()
-    out[:] = -np.inf
+    size = links[0]
+    for k in range(1, 2 * legs):
+        size = max(size, links[k])
+    for d in range(len(out)):
+        out[d] = -np.inf
     anchors, origins = pose.anchors, pose.origins
     known = True
     for i in range(legs):
@@ -144,8 +153,9 @@ def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: 
             if not np.isnan(top):
                 out[ELBOWS] = max(out[ELBOWS], (top - low - bounds.ceiling) / size)
         known = known and not np.isnan(top)
-    if out.max() > enough:
-        return
+    for d in range(len(out)):
+        if out[d] > enough:
+            return
     if not np.isnan(bounds.margin) and known:
         out[TIPS] = (bounds.margin - _margin(bounds, swinging, pose)) / size
         if out[TIPS] > enough:
@@ -159,26 +169,22 @@ def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: 
             return
     if len(bounds.link) and known:
         # of those that are clear of each other it does not matter by how much where only that is asked
-        least_found = -bounds.most if enough == np.inf else 0.0
-        if pose.fresh[1]:
-            pose.moved[:] = True
-            pose.fresh[1] = False
-        own, other = overlap(
-            origins,
-            pose.turn,
-            bounds.link,
-            bounds.ends,
-            bounds.need,
-            bounds.leg,
-            bounds.most,
-            least_found,
-            pose.moved,
-            pose.work,
-        )
+        least = -bounds.most if enough == np.inf else 0.0
+        if least == 0.0 and all_apart(bounds.apart, origins, pose.turn, pose.moved, pose.spans):
+            own = other = least
+        else:
+            if pose.fresh[1]:
+                for k in range(len(pose.moved)):
+                    pose.moved[k] = True
+                pose.fresh[1] = False
+            own, other = overlap(
+                origins, pose.turn, bounds.link, bounds.ends, bounds.need, bounds.leg, bounds.most, least, pose.moved,
+                pose.work,
+            )  # fmt: skip
         out[COLLAPSED], out[CROSSING] = max(out[COLLAPSED], own / size), other / size
 
 
-@njit(cache=True)
+@lean
 def _margin(bounds: Bounds, swinging: BoolArray, pose: Pose) -> float:
     """m from the centre of mass to the nearer of the rearmost and the foremost anchor that carries."""
     center, rear, front = bounds.shift, np.inf, -np.inf

@@ -9,6 +9,7 @@ import numpy as np
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
+from bodyplan.gaits.rectilinear.apart import apart_of
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, worst
 from bodyplan.gaits.rectilinear.moves import Moves, bends
 from bodyplan.gaits.rectilinear.parts import Parts
@@ -81,6 +82,7 @@ class Demands:
         none = np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2)), np.zeros((0, 0)), np.zeros((0, 0), dtype=bool)
         parts = self.parts
         link, ends, need, leg = none if parts is None else (parts.link, parts.ends, parts.need, parts.leg)
+        lengths = np.concatenate([[self.tail], self.links, [0.0]])
         asked = self.margin is not None and self.balance is not None
         return Bounds(
             np.array(self.links, dtype=np.float64),
@@ -93,6 +95,7 @@ class Demands:
             np.ascontiguousarray(need),
             np.ascontiguousarray(leg),
             float(need.max(initial=0.0)),
+            apart_of(Parts(link, ends, need, leg), lengths),
             float(self.tail),
             np.zeros(len(limits)) if self.balance is None else np.array(self.balance.weights, dtype=np.float64),
             0.0 if self.balance is None else float(self.balance.shift),

@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.rectilinear.bounds import Bounds, Pose, room_for
+from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, room_for
+from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Steps, highest, try_move
 
 #: what is known of a spot before it is tried; that the anchor cannot stand there, or that no swing leads there
@@ -37,8 +38,10 @@ class Trial(NamedTuple):
     early: Array
     swinging: BoolArray
     pose: Pose
+    excess: Array
     found: BoolArray
     order: Array
+    still: Array
 
 
 @njit(cache=True)
@@ -52,25 +55,28 @@ def trial_of(bounds: Bounds, here: Array, places: Array) -> Trial:
         np.ones((1, count)),
         np.zeros(count, dtype=np.bool_),
         room_for(bounds),
+        np.empty(len(DEMANDS)),
         np.empty(len(TRIED), dtype=np.bool_),
         places.copy(),
+        np.zeros(1),
     )
 
 
-@njit(cache=True)
+@lean
 def rise(steps: Steps, keeps: Keeps, start: Array, end: Array, tail: bool, head: bool) -> float:
     """How far m the floor under the way of an anchor from ``start`` (2,) to ``end``, its ``tail`` or ``head`` link
     included, stands above the higher of them."""
     low = min(start[0], end[0]) - (keeps.tail if tail else 0.0)
     high = max(start[0], end[0]) + (keeps.head if head else 0.0)
     top, out = max(start[1], end[1]) - keeps.rest, 0.0
-    for at in steps.breaks:
+    for k in range(len(steps.breaks)):
+        at = steps.breaks[k]
         if low <= at <= high:
             out = max(out, highest(steps.floor_x, steps.floor_z, at, at) - top)
     return out
 
 
-@njit(cache=True)
+@lean
 def swing_to(
     bounds: Bounds,
     steps: Steps,
@@ -86,13 +92,15 @@ def swing_to(
     early it rises; or :data:`NO_STANCE`, :data:`NO_SWING`. Over level ground no other shape than the first can help
     against reach or limits, and none is lower."""
     before, after, lift, early = trial.before, trial.after, trial.lift, trial.early
-    after[0, i], before[0, i] = spot, spot
+    for c in range(2):
+        after[0, i, c] = before[0, i, c] = spot[c]
     lift[0, i], early[0, i], trial.swinging[i] = 0.0, 1.0, False
     standing = try_move(
-        bounds, steps, keeps, before, after, lift, early, trial.swinging, 0, np.zeros(1), i, met, False, trial.pose,
-        trial.found,
+        bounds, steps, keeps, before, after, lift, early, trial.swinging, 0, trial.still, i, met, False, trial.pose,
+        trial.excess, trial.found,
     )  # fmt: skip
-    before[0, i] = here[i]
+    for c in range(2):
+        before[0, i, c] = here[i, c]
     out = NO_STANCE if standing >= 0 else NO_SWING
     if standing < 0:
         above = rise(steps, keeps, here[i], spot, i == 0, i == len(here) - 1)
@@ -102,7 +110,7 @@ def swing_to(
             trial.swinging[i] = lift[0, i] > 0.0
             bad = try_move(
                 bounds, steps, keeps, before, after, lift, early, trial.swinging, 0, trial.order, i, met, False,
-                trial.pose, trial.found,
+                trial.pose, trial.excess, trial.found,
             )  # fmt: skip
             if bad < 0:
                 out = s
@@ -113,7 +121,8 @@ def swing_to(
                 trial.order[p] = trial.order[p - 1]
             trial.order[0] = worst
     high, soon = lift[0, i], early[0, i]
-    after[0, i] = here[i]
+    for c in range(2):
+        after[0, i, c] = here[i, c]
     lift[0, i], early[0, i], trial.swinging[i] = 0.0, 1.0, False
     return out, high, soon
 
@@ -190,7 +199,7 @@ def choose(
     return out
 
 
-@njit(cache=True)
+@lean
 def _try(
     bounds: Bounds, steps: Steps, keeps: Keeps, trial: Trial, here: Array, i: int, k: int, spots: Array,
     known: IntArray, made: Array, offer: Offer, met: float,

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from bodyplan.arrays import Array
+from bodyplan.gaits.rectilinear.kernels import lean
 
 #: relative slack of reach: a leg that is too short by less counts as straight
 REACH = 1e-12
@@ -43,7 +43,7 @@ def leg(a: Array, b: Array, x: Array, z: Array) -> Leg:
     return Leg(*out.reshape(5, *along.shape))
 
 
-@njit(cache=True)
+@lean
 def _legs(a: Array, b: Array, x: Array, z: Array, out: Array) -> None:
     for k in range(len(a)):
         length = np.sqrt(x[k] * x[k] + z[k] * z[k])
@@ -52,7 +52,7 @@ def _legs(a: Array, b: Array, x: Array, z: Array, out: Array) -> None:
         out[3, k] = short
 
 
-@njit(cache=True)
+@lean
 def within(a: float, b: float, square: float, short: float) -> tuple[float, float]:
     """S and C of a leg whose chord has that ``square`` (m^2), 0 where they are below it by rounding, NaN where there is
     no such leg. ``short``: S, known better than from the chord."""
@@ -63,7 +63,7 @@ def within(a: float, b: float, square: float, short: float) -> tuple[float, floa
     return s, c
 
 
-@njit(cache=True)
+@lean
 def leg_angles(a: float, b: float, x: float, z: float, short: float) -> tuple[float, float, float, float]:
     """``rear``, ``front``, ``bend`` and ``folded`` of one :class:`Leg`."""
     square = x * x + z * z
@@ -75,7 +75,7 @@ def leg_angles(a: float, b: float, x: float, z: float, short: float) -> tuple[fl
     return alpha + beta, alpha - psi, 2.0 * np.arctan2(np.sqrt(s), np.sqrt(c)), square - (a - b) ** 2
 
 
-@njit(cache=True)
+@lean
 def elbow(a: float, b: float, x: float, z: float, short: float) -> tuple[float, float]:
     """The elbow from the rear anchor, m along and up, without angles; NaN where there is no such leg."""
     square = x * x + z * z
@@ -86,7 +86,7 @@ def elbow(a: float, b: float, x: float, z: float, short: float) -> tuple[float, 
     return share * x - height * z, share * z + height * x
 
 
-@njit(cache=True)
+@lean
 def leg_rates(
     a: float,
     b: float,

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.legs import REACH, Leg, leg_angles, leg_rates
 from bodyplan.gaits.rectilinear.swing import swing_rates, swung
 
@@ -65,7 +66,7 @@ class Moves:
         return State(anchors.reshape(*shape, count, 2), angles[0], angles[1], angles[2], found)
 
 
-@njit(cache=True)
+@lean
 def swing_of(
     before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, start: Array, offset: Array
 ) -> None:
@@ -82,7 +83,7 @@ def swing_of(
             offset[i, 1] = risen_z if tau < 0.5 else left_z
 
 
-@njit(cache=True)
+@lean
 def chord_of(start: Array, offset: Array, i: int, full: float) -> tuple[float, float, float]:
     """Chord of leg ``i`` along and up, m, and its S = ``full`` - L^2: from the nearer end of the move, so that a leg
     that is straight there bends without loss of digits."""

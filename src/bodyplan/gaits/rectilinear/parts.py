@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.robot.model import Robot
 from bodyplan.robot.neighbours import separate_contacts
 
@@ -90,7 +91,7 @@ def _overlaps(
         out[s, 0], out[s, 1] = overlap(origins[s], turn, link, ends, need, leg, most, -most, all_links, work)
 
 
-@njit(cache=True)
+@lean
 def overlap(
     origins: Array,
     turn: Array,
@@ -141,7 +142,7 @@ def overlap(
     return own, other
 
 
-@njit(cache=True)
+@lean
 def _distance(p: Array, q: Array) -> float:
     """Of two segments (4,): x and z of both ends."""
     a, b, c, d = _side(p, q[0], q[1]), _side(p, q[2], q[3]), _side(q, p[0], p[1]), _side(q, p[2], p[3])
@@ -150,12 +151,12 @@ def _distance(p: Array, q: Array) -> float:
     return min(_to(p, q[0], q[1]), _to(p, q[2], q[3]), _to(q, p[0], p[1]), _to(q, p[2], p[3]))
 
 
-@njit(cache=True)
+@lean
 def _side(p: Array, x: float, z: float) -> float:
     return float((p[2] - p[0]) * (z - p[1]) - (p[3] - p[1]) * (x - p[0]))
 
 
-@njit(cache=True)
+@lean
 def _to(p: Array, x: float, z: float) -> float:
     """Distance of a point from a segment."""
     ux, uz, vx, vz = p[2] - p[0], p[3] - p[1], x - p[0], z - p[1]

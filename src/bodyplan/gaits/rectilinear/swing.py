@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from bodyplan.arrays import Array
+from bodyplan.gaits.rectilinear.kernels import lean
 
 PATHS = ("cycloid",)
 #: how long a step up that rises early waits before it goes along, as a share of what it is early by
@@ -49,20 +49,20 @@ def cycloid(u: Array) -> Array:
     return out.reshape(at.shape)
 
 
-@njit(cache=True)
+@lean
 def _swings(tau: Array, dx: Array, dz: Array, lift: Array, early: Array, out: Array) -> None:
     for k in range(len(tau)):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = swung(tau[k], dx[k], dz[k], lift[k], early[k])
         out[k, 4], out[k, 5], out[k, 6], out[k, 7] = swing_rates(tau[k], dx[k], dz[k], lift[k], early[k])
 
 
-@njit(cache=True)
+@lean
 def _cycloids(u: Array, out: Array) -> None:
     for k in range(len(u)):
         out[k] = _cycloid(u[k])
 
 
-@njit(cache=True)
+@lean
 def swung(tau: float, dx: float, dz: float, lift: float, early: float) -> tuple[float, float, float, float]:
     """One anchor of :func:`swing`: ``risen`` and ``landing``, each along and up."""
     u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
@@ -76,7 +76,7 @@ def swung(tau: float, dx: float, dz: float, lift: float, early: float) -> tuple[
     return dx * along, dz * rise + hump, -dx * left, hump - dz * fall
 
 
-@njit(cache=True)
+@lean
 def swing_rates(tau: float, dx: float, dz: float, lift: float, early: float) -> tuple[float, float, float, float]:
     """One anchor of :func:`swing`: ``velocity`` and ``acceleration``, each along and up."""
     u, rest = _smooth(tau), _smooth(1.0 - tau)
@@ -91,12 +91,12 @@ def swing_rates(tau: float, dx: float, dz: float, lift: float, early: float) -> 
     return dx * along * first, up * first, dx * (along2 * first**2 + along * second), up2 * first**2 + up * second
 
 
-@njit(cache=True)
+@lean
 def _smooth(tau: float) -> float:
     return tau * tau * (3.0 - 2.0 * tau)
 
 
-@njit(cache=True)
+@lean
 def _cycloid(u: float) -> float:
     v = 2.0 * np.pi * u
     if v >= 1.0:
@@ -108,7 +108,7 @@ def _cycloid(u: float) -> float:
     return v * w / 6.0 * series / (2.0 * np.pi)
 
 
-@njit(cache=True)
+@lean
 def _cycloid_rates(u: float, rest: float) -> tuple[float, float]:
     """X'(u) = 1 - cos(2 pi u) and X''(u), with full relative precision at both ends; ``rest`` = 1 - u."""
     near = min(u, rest)
@@ -116,7 +116,7 @@ def _cycloid_rates(u: float, rest: float) -> tuple[float, float]:
     return 2.0 * np.sin(np.pi * near) ** 2, turn if u <= rest else -turn
 
 
-@njit(cache=True)
+@lean
 def _parts(u: float, rest: float, idle: float, first: bool) -> tuple[float, float]:
     """How much of a cycloid is over, and how much is left, that takes all of u but an ``idle`` share at its end
     (``first``) or else at its beginning."""
@@ -126,7 +126,7 @@ def _parts(u: float, rest: float, idle: float, first: bool) -> tuple[float, floa
     return min(max(u - idle, 0.0) / share, 1.0), min(rest / share, 1.0)
 
 
-@njit(cache=True)
+@lean
 def _part_rates(u: float, rest: float, idle: float, first: bool) -> tuple[float, float]:
     """First two derivatives by u of the cycloid of :func:`_parts`."""
     over, left = _parts(u, rest, idle, first)

@@ -10,6 +10,7 @@ from numba import njit
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, excess, lay, room_for
+from bodyplan.gaits.rectilinear.kernels import lean
 
 #: relative slack of a foot that stands
 STANDS = 1e-12
@@ -48,17 +49,43 @@ class Keeps(NamedTuple):
     size: float
 
 
-@njit(cache=True)
+@lean
+def left_of(xs: Array, x: float) -> int:
+    """How many of ``xs`` (k,), ascending, are less than ``x``."""
+    low, high = 0, len(xs)
+    while low < high:
+        middle = (low + high) // 2
+        if xs[middle] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@lean
+def up_to(xs: Array, x: float) -> int:
+    """How many of ``xs`` (k,), ascending, are not more than ``x``."""
+    low, high = 0, len(xs)
+    while low < high:
+        middle = (low + high) // 2
+        if xs[middle] <= x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@lean
 def highest(xs: Array, zs: Array, low: float, high: float) -> float:
     """Highest level of a floor from ``low`` to ``high`` m, both ends included."""
-    first, last = np.searchsorted(xs, low, side="left"), np.searchsorted(xs, high, side="right")
+    first, last = left_of(xs, low), up_to(xs, high)
     out = zs[first]
     for k in range(first + 1, last + 1):
         out = max(out, zs[k])
     return float(out)
 
 
-@njit(cache=True)
+@lean
 def room_above(steps: Steps, low: float, high: float) -> float:
     """The least height m between floor and ceiling from ``low`` to ``high``."""
     out = np.inf
@@ -70,14 +97,14 @@ def room_above(steps: Steps, low: float, high: float) -> float:
     return out
 
 
-@njit(cache=True)
+@lean
 def nearer(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float, least: float) -> bool:
     """Whether a segment, along and up, is nearer than ``least`` m to a floor with steps at ``xs`` (k,) and levels
     ``zs`` (k + 1,), or below it: straight down to a tread, straight across to a face, or to an edge."""
     if x0 > x1:
         x0, z0, x1, z1 = x1, z1, x0, z0
     low, high, reach = min(z0, z1), max(z0, z1), max(least, 0.0)
-    first, last = np.searchsorted(xs, x0 - reach, side="left"), np.searchsorted(xs, x1 + reach, side="right")
+    first, last = left_of(xs, x0 - reach), up_to(xs, x1 + reach)
     for i in range(first, last + 1):
         a = max(x0, xs[i - 1]) if i > 0 else x0
         b = min(x1, xs[i]) if i < len(xs) else x1
@@ -101,7 +128,7 @@ def nearer(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float, lea
     return False
 
 
-@njit(cache=True)
+@lean
 def _distance(x0: float, z0: float, x1: float, z1: float, x: float, z: float) -> float:
     """Of a point (x, z) from a segment, m."""
     dx, dz = x1 - x0, z1 - z0
@@ -111,10 +138,10 @@ def _distance(x0: float, z0: float, x1: float, z1: float, x: float, z: float) ->
     return float(np.hypot(x - x0 - share * dx, z - z0 - share * dz))
 
 
-@njit(cache=True)
+@lean
 def _at_corner(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float, need: float, slack: float) -> bool:
     """Whether a segment is nearer to an edge of a floor than ``need`` m by more than ``slack``."""
-    for k in range(np.searchsorted(xs, min(x0, x1) - need, side="left"), len(xs)):
+    for k in range(left_of(xs, min(x0, x1) - need), len(xs)):
         if xs[k] > max(x0, x1) + need:
             break
         edge = max(zs[k], zs[k + 1])
@@ -123,7 +150,7 @@ def _at_corner(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float,
     return False
 
 
-@njit(cache=True)
+@lean
 def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -> tuple[bool, bool]:
     """Whether a pose reaches into the floor or its edges, and into the ceiling. ``only``: the one anchor with whose
     legs, tail or head link that may be (-1: all)."""
@@ -144,7 +171,7 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
     reach, above = keeps.body + max(keeps.margin, keeps.low), keeps.top + keeps.margin
     ground = highest(floor_x, floor_z, left - reach, right + reach)
     roof = highest(steps.roof_x, steps.roof_z, left - above, right + above)
-    edge = np.searchsorted(floor_x, left - reach, side="left")
+    edge = left_of(floor_x, left - reach)
     edges = edge < len(floor_x) and floor_x[edge] <= right + reach
     floor = ceiling = False
     # where no step is near the floor is level under all of the body
@@ -167,7 +194,7 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
     return floor, ceiling
 
 
-@njit(cache=True)
+@lean
 def _crouched(steps: Steps, keeps: Keeps, pose: Pose, at: Array) -> bool:
     """Whether the body is higher than the lowest place near anchors ``at`` (N, 2) leaves room for."""
     low, high = pose.anchors[0, 1], -np.inf
@@ -179,7 +206,7 @@ def _crouched(steps: Steps, keeps: Keeps, pose: Pose, at: Array) -> bool:
     return bool(high - low - (room - keeps.rest - keeps.top - keeps.margin) > 0.0)
 
 
-@njit(cache=True)
+@lean
 def try_move(
     bounds: Bounds,
     steps: Steps,
@@ -195,16 +222,17 @@ def try_move(
     met: float,
     every: bool,
     pose: Pose,
+    found: Array,
     out: BoolArray,
 ) -> int:
     """What of :data:`TRIED` move ``m`` runs into at ``places`` (p,) of tau, into ``out`` (9,), and the place where the
     first was found, -1 where none is. ``every``: all of it, the ground only where the demands are met; or else the
-    first thing that is found."""
-    found = np.empty(len(DEMANDS))
+    first thing that is found. ``pose`` and ``found`` (7,) are room."""
     enough = np.inf if every else met
     first = -1
-    out[:] = False
-    pose.fresh[:] = True
+    for d in range(len(out)):
+        out[d] = False
+    pose.fresh[0] = pose.fresh[1] = True
     for p in range(len(places)):
         lay(bounds, before, after, lift, early, m, places[p], pose)
         excess(bounds, swinging, pose, enough, found)
@@ -225,7 +253,10 @@ def try_move(
             first = p
             if not every:
                 return first
-    if every and not out[: len(DEMANDS)].any():
+    met_all = True
+    for d in range(len(DEMANDS)):
+        met_all = met_all and not out[d]
+    if every and met_all:
         for p in range(len(places)):
             lay(bounds, before, after, lift, early, m, places[p], pose)
             floor, ceiling = into_ground(steps, keeps, pose, only, met)
@@ -250,8 +281,23 @@ def try_moves(
     out: BoolArray,
 ) -> None:
     """:func:`try_move` for every move, into ``out`` (M, 9)."""
-    pose = room_for(bounds)
+    pose, found = room_for(bounds), np.empty(len(DEMANDS))
     for m in range(len(before)):
         try_move(
-            bounds, steps, keeps, before, after, lift, early, swinging[m], m, places, only, met, every, pose, out[m]
+            bounds,
+            steps,
+            keeps,
+            before,
+            after,
+            lift,
+            early,
+            swinging[m],
+            m,
+            places,
+            only,
+            met,
+            every,
+            pose,
+            found,
+            out[m],
         )

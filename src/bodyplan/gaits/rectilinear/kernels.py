@@ -1,0 +1,17 @@
+"""How the kernels of inching are compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from numba import njit
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+
+def lean(kernel: Kernel) -> Kernel:
+    """``njit`` for kernels that make no arrays: they do without Numba's counts of references, which take longer than
+    the arithmetic of one pose, and without its tests for divisions by zero."""
+    compiled: Any = njit
+    return cast(Kernel, compiled(cache=True, nogil=True, error_model="numpy", _nrt=False)(kernel))
