@@ -5,7 +5,8 @@ import pytest
 
 import bodyplan as bp
 from bodyplan.gaits.carry import pose, pose_of, wheel_rates
-from bodyplan.gaits.carry.contact import find
+from bodyplan.gaits.carry import rates as wheel_motion
+from bodyplan.gaits.carry.contact import TOUCHES, find
 from bodyplan.gaits.carry.pose import planes_of
 from bodyplan.gaits.carry.terrain import terrain
 from bodyplan.gaits.carry.wheels import Wheels
@@ -147,3 +148,15 @@ def test_accelerations_of_a_motion_are_differences_of_its_rates(name: str) -> No
             assert error.max() < 1e-5
         # a third derivative of the map jumps at every cell, a wheel meets an edge now and then
         assert np.quantile(error, 0.99) < 1e-4
+
+
+def test_the_spin_alone_is_that_of_all_rates() -> None:
+    wheels, land, rng = Wheels.of(ROBOT), terrain(GROUNDS["hills"]), np.random.default_rng(2)
+    count, spots = 50, np.column_stack([rng.uniform(-1.0, 1.0, (50, 2)), np.full(50, 0.25)])
+    found = find(land, planes_of(wheels, spots, np.tile(np.eye(3), (count, 1, 1))))
+    assert (found.outcome == TOUCHES).any()
+    turned = np.linalg.qr(rng.normal(size=(3 * count, 3, 3)))[0]
+    carried = wheel_motion.Carried(*(rng.normal(size=(3 * count, 3)) for _ in range(5)), *np.moveaxis(turned, 1, 0))
+    np.testing.assert_array_equal(
+        wheel_motion.rolling(found, carried), wheel_motion.rates(land, found, carried).rolling
+    )

@@ -16,7 +16,7 @@ from bodyplan.gaits.carry.contact import Contacts
 from bodyplan.gaits.carry.heights import height_of
 from bodyplan.gaits.carry.holding import hold, holding_claims, holding_facts, holding_notes, judged
 from bodyplan.gaits.carry.pose import WheelContact, planes_of, wheel_contact
-from bodyplan.gaits.carry.rates import Rates, rates
+from bodyplan.gaits.carry.rates import Rates, rates, rolling
 from bodyplan.gaits.carry.report import claims, facts, notes
 from bodyplan.gaits.carry.terrain import Terrain, terrain
 from bodyplan.gaits.carry.verdict import judge
@@ -155,10 +155,10 @@ def spin(wheels: Wheels, land: Terrain, at: Callable[[Array], Carriage], t: Arra
     nodes = parts[:-1, None] + half[:, None] * (1.0 + _NODES)
     body = at(nodes.ravel())
     found = contact.find(land, planes_of(wheels, body.position, body.turn.matrix))
-    moved = rates(land, found, body.carried(wheels))
+    speeds = rolling(found, body.carried(wheels))
     last = np.cumsum(counts) - 1
     for k, wheel in enumerate(wheels):
-        speed = moved.rolling[k * nodes.size : (k + 1) * nodes.size]
+        speed = speeds[k * nodes.size : (k + 1) * nodes.size]
         touching = found.outcome[k * nodes.size : (k + 1) * nodes.size] == contact.TOUCHES
         speed = np.where(touching & np.isfinite(speed), speed, 0.0).reshape(nodes.shape)
         rolled.q[:, wheel.spin] = np.cumsum((speed @ _WEIGHTS) * half)[last] / wheel.turn

@@ -81,6 +81,15 @@ def rates(ground: Terrain, found: Contacts, carried: Carried) -> Rates:
     return Rates(angle, angle_rate, radius, radius_rate, rolling, rolling_rate, slip, of_wheel[:, 3:])
 
 
+def rolling(found: Contacts, carried: Carried) -> Array:
+    """The spin (n,) rad/s that rolls without slip: that of :func:`rates`, which needs nothing of the ground."""
+    from bodyplan.gaits.carry.rates_kernel import rolls
+
+    radius, out = np.where(found.outcome == TOUCHES, found.radius, np.nan), np.empty(len(found.phi))
+    rolls(carried.velocity, carried.spin, carried.ahead, carried.down, found.phi, radius, out)
+    return out
+
+
 def _rows(found: Contacts) -> Array:
     """Contacts (n, 9) as kernels take them."""
     bends = found.hessian.reshape(-1, 4)[:, [0, 1, 3]]

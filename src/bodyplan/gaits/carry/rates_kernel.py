@@ -95,6 +95,17 @@ def rollings(carried: Array, found: Array, rates: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def rolls(velocity: Array, spin: Array, ahead: Array, down: Array, phi: Array, radius: Array, out: Array) -> None:
+    """The spins of :func:`rollings` alone, from columns (n, 3) of their carriages, into ``out`` (n,)."""
+    for k in range(len(phi)):
+        sine, cosine = math.sin(phi[k]), math.cos(phi[k])
+        a, d = _at(ahead[k], 0), _at(down[k], 0)
+        u, t = _plus(_times(sine, a), cosine, d), _plus(_times(cosine, a), -sine, d)
+        plain = _plus(_at(velocity[k], 0), 1.0, _cross(_at(spin[k], 0), _times(radius[k], u)))
+        out[k] = _dot(plain, t) / radius[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _frame(c: Array, at: Array) -> tuple[Vector, Vector, Vector, Vector]:
     """u, t, N with z = 1 where the ground is not upright, and H t."""
     sine, cosine = math.sin(at[PHI]), math.cos(at[PHI])
