@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +13,13 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, frozen, number
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground, Solid, region, spatial_points
-from bodyplan.ground.descent import JetFunction
-from bodyplan.ground.nearest import Bounds, nearest
+from bodyplan.ground.nearest import Bounds, JetFunction, nearest
+
+if TYPE_CHECKING:
+    from bodyplan.ground.field_kernel import FieldArrays
 
 #: samples along each side of a field for physics and pictures
 MAX_SIDE = 1024
-_CHUNK = 32_768
 #: regions whose bounds are remembered
 _REGIONS = 4096
 
@@ -67,6 +69,11 @@ class Field(Ground):
     def _regions(self) -> dict[tuple[float, ...], tuple[float, float]]:
         return {}
 
+    @property
+    @abstractmethod
+    def field_arrays(self) -> FieldArrays:
+        """The field for kernels."""
+
     def field_creases(self) -> Sequence[JetFunction]:
         """Functions whose zeros are the lines where the ground has no derivative."""
         return ()
@@ -86,22 +93,29 @@ class Field(Ground):
         formula is undefined. Raises InputError for a point beyond the edge or above no ground.
         """
         p = spatial_points(points)
-        flat = p.reshape(-1, 3)
-        out = np.empty_like(flat)
-        for start in range(0, len(flat), _CHUNK):
-            part = flat[start : start + _CHUNK]
-            self.height(part)  # refuses a point beyond the edge or without ground
-            uv = nearest(self, part)
-            out[start : start + _CHUNK, :2] = uv
-            out[start : start + _CHUNK, 2] = self.field_jet(uv[:, 0], uv[:, 1])[0]
-        return out.reshape(p.shape)
+        flat = p.reshape(-1, 1, 3)
+        uv, _ = self.nearest_up_to(flat, np.full(len(flat), np.inf))
+        return np.concatenate([uv, self.field_jet(uv[:, 0], uv[:, 1])[0][:, None]], axis=1).reshape(p.shape)
 
     def clearance(self, points: ArrayLike) -> Array:
         """Signed Euclidean distance (...,) in m from points (..., 3) to the ground: that of :meth:`nearest`,
         negative below the ground."""
         p = spatial_points(points)
-        distance = np.linalg.norm(p - self.nearest(p), axis=-1)
-        return np.asarray(np.copysign(distance, self.gap(p)))
+        flat = p.reshape(-1, 1, 3)
+        return self.nearest_up_to(flat, np.full(len(flat), np.inf))[1].reshape(p.shape[:-1])
+
+    def nearest_up_to(self, points: Array, caps: Array) -> tuple[Array, Array]:
+        """Of groups of ``points`` (n, k, 3): the place (n, 2) of the nearest ground and its signed distance (n,) m, the
+        smallest of the group; nan and the cap where nothing is nearer than ``caps`` (n,) m.
+
+        Raises InputError for a point beyond the edge or above no ground.
+        """
+        found, distance, refused = nearest(self.field_arrays, points, caps)
+        if refused >= 0:
+            flat = points.reshape(-1, 3)
+            self.height(flat)
+            raise InputError(f"{type(self).__name__}: no ground below the point {flat[refused]} (index {refused}).")
+        return found, distance
 
     def solids(self, low: ArrayLike, high: ArrayLike, *, cell: float | None = None) -> list[Solid]:
         """The ground in the box's x and y as one grid of samples, edges included.
@@ -140,6 +154,8 @@ class Field(Ground):
     def _check_inside(self, x: Array, y: Array) -> None:
         """InputError naming the first point beyond the edge (rounding of the edge itself is forgiven)."""
         low, high = self.field_box
+        if x.size and low[0] <= x.min() and low[1] <= y.min() and x.max() <= high[0] and y.max() <= high[1]:
+            return
         xy = np.stack([x, y], axis=-1)
         slack = 1e-12 * np.where(np.isfinite(high - low), high - low, 0.0)
         outside = np.any((xy < low - slack) | (xy > high + slack), axis=-1)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,9 @@ from bodyplan.ground.field import Field
 from bodyplan.ground.heightfiles import check_size, pair, read_grid
 from bodyplan.ground.nearest import Bounds
 from bodyplan.ground.spline import BicubicSpline
+
+if TYPE_CHECKING:
+    from bodyplan.ground.field_kernel import FieldArrays
 
 #: beyond this many samples a map is described by its bytes, not by lists
 _LISTED = 4096
@@ -152,6 +156,21 @@ class HeightMap(Field):
             given["z"] = _unpacked(given["z"])
         return super().from_arguments(given)
 
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, HeightMap)
+            and (self._cell, self._origin, self.friction) == (other._cell, other._origin, other.friction)
+            and np.array_equal(self._z, other._z)
+        )
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # of numbers only: that of text or None would be another one in a process that gets a copy of this map
+        return hash((self._z.shape, self._cell, self._origin, float(self._z.min()), float(self._z.max())))
+
     @property
     def z(self) -> Array:
         """Heights at the samples (ny, nx) in m, read-only."""
@@ -186,6 +205,12 @@ class HeightMap(Field):
         self._check_inside(x, y)
         z, g, h = self.field_jet(x.ravel(), y.ravel())
         return z.reshape(x.shape), g.reshape((*x.shape, 2)), h.reshape((*x.shape, 2, 2))
+
+    @cached_property
+    def field_arrays(self) -> FieldArrays:
+        from bodyplan.ground.field_kernel import spline_field
+
+        return spline_field(self._box, self._spline, self._origin)
 
     def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         return self._spline.jet(x - self._origin[0], y - self._origin[1])

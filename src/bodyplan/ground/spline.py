@@ -55,8 +55,12 @@ class BicubicSpline:
 
     def value(self, x: Array, y: Array) -> Array:
         """Value (n,) at x, y (n,); that of :meth:`jet`, for less."""
-        u, v, cells = self._at(x, y)
-        return np.asarray(np.sum(np.sum(_weights(v)[:, :, None] * cells, axis=1) * _weights(u), axis=1) + self.level)
+        from bodyplan.ground.spline_kernel import spline_values
+
+        value = np.empty(len(x))
+        at_x, at_y = (np.ascontiguousarray(v, dtype=np.float64) for v in (x, y))
+        spline_values(self.nodes, float(self.step[0]), float(self.step[1]), self.level, at_x, at_y, value)
+        return value
 
     def hessian_rate(self, x: Array, y: Array, vx: Array, vy: Array) -> Array:
         """Rate (n, 2, 2) of the Hessian at x, y (n,) for points that move by vx, vy (n,) a unit of time; third

@@ -20,6 +20,31 @@ def spline_jet(nodes: Array, dx: float, dy: float, x: Array, y: Array, f: Array,
         h[k, 0, 1] = h[k, 1, 0] = out[4]
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def spline_values(nodes: Array, dx: float, dy: float, level: float, x: Array, y: Array, f: Array) -> None:
+    """Fill ``f`` (n,) with values above ``level`` as :func:`spline_jet`."""
+    ny, nx = nodes.shape[0], nodes.shape[1]
+    for k in range(len(x)):
+        u, v = x[k] / dx, y[k] / dy
+        if not (np.isfinite(u) and np.isfinite(v)):
+            f[k] = np.nan
+            continue
+        i = int(min(max(np.floor(u), 0.0), nx - 2.0))
+        j = int(min(max(np.floor(v), 0.0), ny - 2.0))
+        u -= i
+        v -= j
+        r, s = 1.0 - u, 1.0 - v
+        a0, a1, b0, b1 = (1.0 + 2.0 * u) * r * r, u * r * r, u * u * (3.0 - 2.0 * u), -u * u * r
+        c0, c1, d0, d1 = (1.0 + 2.0 * v) * s * s, v * s * s, v * v * (3.0 - 2.0 * v), -v * v * s
+        value = 0.0
+        for b in range(2):
+            p, q = nodes[j + b, i], nodes[j + b, i + 1]
+            at = p[0, 0] * a0 + p[0, 1] * a1 + q[0, 0] * b0 + q[0, 1] * b1
+            slope = p[1, 0] * a0 + p[1, 1] * a1 + q[1, 0] * b0 + q[1, 1] * b1
+            value += c0 * at + c1 * slope if b == 0 else d0 * at + d1 * slope
+        f[k] = value + level
+
+
 @njit(cache=True, nogil=True)
 def spline_at(nodes: Array, dx: float, dy: float, x: float, y: float, basis: Array, out: Array) -> None:
     """Value, slopes along x and y, second derivatives xx, xy, yy at one place into ``out`` (6+,), nan where it is not

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,11 @@ from bodyplan.arrays import Array, finite, frozen
 from bodyplan.errors import InputError
 from bodyplan.expressions import Expression
 from bodyplan.ground.base import coulomb, planar
-from bodyplan.ground.descent import JetFunction
 from bodyplan.ground.field import Field
-from bodyplan.ground.nearest import Bounds
+from bodyplan.ground.nearest import Bounds, JetFunction
+
+if TYPE_CHECKING:
+    from bodyplan.ground.field_kernel import FieldArrays
 
 
 class Surface(Field):
@@ -73,6 +75,12 @@ class Surface(Field):
 
     def field_hessian_rate(self, x: Array, y: Array, dx: Array, dy: Array) -> Array:
         return self._expression.jet_rates(x=(x, dx), y=(y, dy))[2]
+
+    @cached_property
+    def field_arrays(self) -> FieldArrays:
+        from bodyplan.ground.field_kernel import formula_field
+
+        return formula_field(self._box, self._expression)
 
     def field_creases(self) -> Sequence[JetFunction]:
         return [partial(_jet_of, kink) for kink in self._expression.kinks]

@@ -11,9 +11,8 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.errors import InputError
 from bodyplan.ground.base import Ground
-from bodyplan.ground.descent import JetFunction
 from bodyplan.ground.field import Field
-from bodyplan.ground.nearest import Bounds
+from bodyplan.ground.nearest import Bounds, JetFunction
 from bodyplan.ground.plane import Plane
 from bodyplan.ground.profile import Profile
 
