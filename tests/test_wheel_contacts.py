@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import bodyplan as bp
-from bodyplan.gaits.carry import pose, pose_of, search
+from bodyplan.gaits.carry import contact, pose, pose_of
 from bodyplan.gaits.carry.planes import Planes
 from wheel_cases import nearest_by_brute_force, paper_system, rotation
 
@@ -267,19 +267,26 @@ def test_refusals(make, words) -> None:  # type: ignore[no-untyped-def]
         assert word in str(raised.value)
 
 
-def test_search_on_a_height_map_is_that_of_any_ground() -> None:
-    """Wheel by wheel in the kernel, or all at once over any ground: the same contacts, the same proofs."""
+@pytest.mark.parametrize("rough, cell", [(0.03, 0.1), (0.01, 0.03), (0.08, 0.25), (0.0, 0.2)])
+def test_contacts_on_a_height_map_are_those_of_any_ground(rough: float, cell: float) -> None:
+    """Wheel by wheel in kernels, or all at once over any ground: the same contacts, the same proofs; also of wheels
+    that lean, that reach over the edge, whose axle is in the ground, and from other places to start from."""
     rng = np.random.default_rng(3)
-    ground = bp.HeightMap(0.03 * rng.normal(size=(41, 41)), 0.1, (-2.0, -2.0))
-    count = 60
-    level = ground.height(place := rng.uniform(-1.2, 1.2, (count, 2)))
-    centre = np.concatenate([place, (level + rng.uniform(0.1, 0.3, count))[:, None]], axis=1)
+    ground = bp.HeightMap(rough * rng.normal(size=(41, 41)), cell, (-20.0 * cell, -20.0 * cell))
+    count, inner = 80, 20.0 * cell - 0.5
+    place = rng.uniform(-inner, inner, (count, 2))
+    place[:4] *= 20.0 * cell / inner  # some near the edge
+    centre = np.concatenate([place, (ground.height(place) + rng.uniform(-0.02, 0.3, count))[:, None]], axis=1)
     turns = [rotation(*(rng.normal(size=3) * [0.2 * (i % 2), 0.2 * (i % 2), 2.0])) for i in range(count)]
     planes = Planes.of(centre, np.array([R[:, 0] for R in turns]), np.array([R[:, 1] for R in turns]))
-    guess = rng.uniform(-0.05, 0.05, count)
-    quick, plain = search.nearest(ground, planes, guess), search._Search(ground, planes, guess).run()
-    np.testing.assert_array_equal(quick.certified, plain.certified)
-    assert quick.certified.mean() > 0.8
-    sure = quick.certified
-    np.testing.assert_allclose(quick.distance[sure], plain.distance[sure], rtol=1e-12)
-    np.testing.assert_allclose(quick.s[sure], plain.s[sure], atol=1e-9)
+    for start in (None, rng.uniform(-1.0, 1.0, count)):
+        quick, plain = contact._in_kernels(ground, planes, start), contact._at_once(ground, planes, start)
+        inside = np.abs(place).max(axis=1) < inner
+        np.testing.assert_array_equal(quick.outcome[inside], plain.outcome[inside])
+        assert (quick.outcome == contact.TOUCHES).mean() > 0.8
+        some = (quick.outcome == contact.TOUCHES) & (plain.outcome == contact.TOUCHES)
+        np.testing.assert_allclose(quick.radius[some], plain.radius[some], rtol=1e-12)
+        for name, off in (("phi", 1e-9), ("point", 1e-9), ("normal", 1e-8), ("curvature", 1e-6), ("hessian", 1e-6)):
+            np.testing.assert_allclose(getattr(quick, name)[some], getattr(plain, name)[some], atol=off)
+        np.testing.assert_array_equal(np.isnan(quick.second[some]), np.isnan(plain.second[some]))
+        assert not quick.corner.any() and quick.residual[some].max() < 1e-12

@@ -10,9 +10,10 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry import newton, search, steps
 from bodyplan.gaits.carry.planes import Planes, Section, section
 from bodyplan.gaits.carry.terrain import Steps, Terrain
+from bodyplan.ground.heightmap import HeightMap
 from bodyplan.threads import shared
 
-#: outcomes
+#: outcomes, as in :mod:`bodyplan.gaits.carry.contact_kernel`
 TOUCHES, LIES_FLAT, NO_GROUND, AXLE_BELOW, UNPROVED, OFF_THE_MAP = range(6)
 #: relative difference up to which Newton's contact is the one that the search found
 SAME = 1e-10
@@ -20,6 +21,8 @@ SAME = 1e-10
 RESIDUAL = 1e-11
 #: wheels looked at in one go
 CHUNK = 8192
+#: wheels on a height map from which on threads share the kernels' work
+THREADED = 4096
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contact
             parts[k] = _find(ground, planes.take(index), None if start is None else start[index])
         return 0
 
-    shared(part, len(planes), threaded_from=2 * CHUNK)
+    shared(part, len(planes), threaded_from=THREADED if isinstance(ground, HeightMap) else 2 * CHUNK)
     found = [parts[k] for k in sorted(parts)]
     return Contacts(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Contacts)))
 
@@ -70,6 +73,13 @@ def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contact
 def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
     if isinstance(ground, Steps):
         return _on_steps(ground, planes)
+    if isinstance(ground, HeightMap):
+        return _in_kernels(ground, planes, start)
+    return _at_once(ground, planes, start)
+
+
+def _at_once(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
+    """Of all wheels by arrays, on any smooth ground."""
     foot = section(ground, planes, np.zeros(len(planes)))
     outcome = np.full(len(planes), TOUCHES)
     outcome[foot.w >= 0.0] = AXLE_BELOW
@@ -109,6 +119,35 @@ def _on_steps(ground: Steps, planes: Planes) -> Contacts:
     none = np.zeros((len(planes), 2, 2))
     phi = np.arctan2(found.s, -found.w) - planes.lean
     return Contacts(phi, radius, point, normal, curvature, residual, second, found.edge, none, outcome)
+
+
+def _in_kernels(ground: HeightMap, planes: Planes, start: Array | None) -> Contacts:
+    """The same on a height map, wheel by wheel."""
+    from bodyplan.gaits.carry import contact_kernel
+    from bodyplan.gaits.carry.section_kernel import COLUMNS, Land, Room
+
+    count, land, room = len(planes), Land.of(ground), Room.of(search.MOST_CELLS)
+    rows, limits = planes.rows, search.limits()
+    first = np.full(count, np.nan) if start is None else np.ascontiguousarray(start, dtype=np.float64)
+    feet, chi, radius = np.empty((count, COLUMNS)), np.empty(count), np.empty(count)
+    settled, outcome = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.int64)
+    contact_kernel.settle(land, rows, planes.lean, planes.flat, first, SAME, room, feet, chi, radius, settled, outcome)
+    some = np.flatnonzero(settled)
+    sure = np.zeros(count, dtype=np.bool_)
+    sure[some] = search.certain_in_region(ground, planes.take(some), radius[some])
+    second, corner = np.full(count, np.nan), np.zeros(count, dtype=np.bool_)
+    edged = bool(ground.field_creases())
+    contact_kernel.prove(
+        land, rows, planes.lean, feet, sure, settled, edged, SAME, search.CERTAIN, limits, room,
+        chi, radius, second, corner, outcome,
+    )  # fmt: skip
+    phi, curvature, residual = np.empty(count), np.empty(count), np.empty(count)
+    point, normal, hessian = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 2, 2))
+    contact_kernel.measure(
+        land, rows, planes.lean, chi, radius, corner, RESIDUAL, room,
+        phi, point, normal, curvature, residual, hessian, outcome,
+    )  # fmt: skip
+    return Contacts(phi, radius, point, normal, curvature, residual, second, corner, hessian, outcome)
 
 
 def _guess(foot: Section, planes: Planes, start: Array | None) -> tuple[Array, Array]:

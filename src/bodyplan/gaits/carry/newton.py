@@ -21,6 +21,7 @@ from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry.planes import Planes
+from bodyplan.gaits.carry.section_kernel import lean
 from bodyplan.gaits.carry.terrain import Terrain
 
 MOST_STEPS = 80
@@ -30,6 +31,8 @@ ROUNDING = 1e-14
 TURN, SHARE = 0.6, 0.5
 #: columns of the state: chi, R of the trial; of the best so far; the step from there; its merit; halvings
 CHI, RADIUS, BEST_CHI, BEST_RADIUS, STEP_CHI, STEP_RADIUS, MERIT, HALVINGS = range(8)
+#: what a trial says
+GOES_ON, SETTLED, GIVES_UP = range(3)
 
 
 def solve(ground: Terrain, planes: Planes, chi: Array, radius: Array) -> tuple[Array, Array, BoolArray]:
@@ -81,52 +84,65 @@ def advance(
     """One trial of every active wheel judged, and the next one laid out; those that go on are moved to the front of
     ``active``, their number is returned."""
     left = 0
+    plane, at = np.empty(9), np.empty(6)
     for i in range(len(active)):
         k = active[i]
-        x = state[k]
-        sine, cosine, radius = math.sin(x[CHI]), math.cos(x[CHI]), x[RADIUS]
-        ge = g[i, 0] * ahead[k, 0] + g[i, 1] * ahead[k, 1]
-        nv = up[k, 2] - g[i, 0] * up[k, 0] - g[i, 1] * up[k, 1]
-        h = centre[k, 2] - radius * cosine * up[k, 2] - f[i]
-        tangent = -ge * cosine + nv * sine
-        merit = h * h + (radius * tangent) ** 2
-        tiny = ROUNDING * (1.0 + abs(centre[k, 0]) + abs(centre[k, 1]) + abs(centre[k, 2]))
-        if merit < x[MERIT]:
-            x[BEST_CHI], x[BEST_RADIUS], x[MERIT], x[HALVINGS] = x[CHI], x[RADIUS], merit, 0.0
-            hee, hev, hvv = _plane_hessian(hessian[i], ahead[k], up[k])
-            bend = cosine * cosine * hee + 2.0 * sine * cosine * hev + sine * sine * hvv
-            mixed = sine * cosine * (hee - hvv) + (sine * sine - cosine * cosine) * hev
-            a, b = radius * tangent, -ge * sine - nv * cosine
-            c, d = -b - radius * bend, -mixed
-            determinant = a * d - b * c
-            step_chi = -(d * h - b * tangent) / determinant
-            step_radius = -(a * tangent - c * h) / determinant
-            if not (math.isfinite(step_chi) and math.isfinite(step_radius)):
-                # no direction here: straight on to the ground
-                step_chi, step_radius = 0.0, -h / b if b != 0.0 else -0.5 * radius
-            cut = min(1.0, TURN / max(abs(step_chi), 1e-300), SHARE * radius / max(abs(step_radius), 1e-300))
-            x[STEP_CHI], x[STEP_RADIUS] = cut * step_chi, cut * step_radius
-            if abs(x[STEP_CHI]) * radius + abs(x[STEP_RADIUS]) <= tiny:
-                settled[k] = True
-                continue
+        for j in range(3):
+            plane[j], plane[3 + j], plane[6 + j] = centre[k, j], ahead[k, j], up[k, j]
+        at[0], at[1], at[2] = f[i], g[i, 0], g[i, 1]
+        at[3], at[4], at[5] = hessian[i, 0, 0], hessian[i, 0, 1], hessian[i, 1, 1]
+        outcome = tried(state[k], plane, at)
+        if outcome == GOES_ON:
+            active[left] = k
+            left += 1
         else:
-            x[HALVINGS] += 1.0
-            x[STEP_CHI] *= 0.5
-            x[STEP_RADIUS] *= 0.5
-            # the best is as good as rounding allows where even a tiny step does not improve it
-            if abs(x[STEP_CHI]) * radius + abs(x[STEP_RADIUS]) <= tiny or x[HALVINGS] > 60.0:
-                settled[k] = x[MERIT] <= 100.0 * tiny * tiny
-                continue
-        x[CHI], x[RADIUS] = x[BEST_CHI] + x[STEP_CHI], x[BEST_RADIUS] + x[STEP_RADIUS]
-        active[left] = k
-        left += 1
+            settled[k] = outcome == SETTLED
     return left
 
 
-@njit(cache=True, nogil=True)
-def _plane_hessian(hessian: Array, ahead: Array, up: Array) -> tuple[float, float, float]:
-    """ahead' H ahead, ahead' H up, up' H up."""
-    ex, ey, vx, vy = ahead[0], ahead[1], up[0], up[1]
-    xx, xy, yy = hessian[0, 0], hessian[0, 1], hessian[1, 1]
+@lean
+def tried(x: Array, plane: Array, at: Array) -> int:
+    """The trial of one wheel's state ``x`` (8,) judged by the ground's jet ``at`` (6+,) there, and the next one laid
+    out; ``plane`` (9,): centre, ahead, up."""
+    sine, cosine, radius = math.sin(x[CHI]), math.cos(x[CHI]), x[RADIUS]
+    ge = at[1] * plane[3] + at[2] * plane[4]
+    nv = plane[8] - at[1] * plane[6] - at[2] * plane[7]
+    h = plane[2] - radius * cosine * plane[8] - at[0]
+    tangent = -ge * cosine + nv * sine
+    merit = h * h + (radius * tangent) ** 2
+    tiny = ROUNDING * (1.0 + abs(plane[0]) + abs(plane[1]) + abs(plane[2]))
+    if merit < x[MERIT]:
+        x[BEST_CHI], x[BEST_RADIUS], x[MERIT], x[HALVINGS] = x[CHI], x[RADIUS], merit, 0.0
+        hee, hev, hvv = _plane_hessian(at, plane)
+        bend = cosine * cosine * hee + 2.0 * sine * cosine * hev + sine * sine * hvv
+        mixed = sine * cosine * (hee - hvv) + (sine * sine - cosine * cosine) * hev
+        a, b = radius * tangent, -ge * sine - nv * cosine
+        c, d = -b - radius * bend, -mixed
+        determinant = a * d - b * c
+        step_chi = -(d * h - b * tangent) / determinant
+        step_radius = -(a * tangent - c * h) / determinant
+        if not (math.isfinite(step_chi) and math.isfinite(step_radius)):
+            # no direction here: straight on to the ground
+            step_chi, step_radius = 0.0, -h / b if b != 0.0 else -0.5 * radius
+        cut = min(1.0, TURN / max(abs(step_chi), 1e-300), SHARE * radius / max(abs(step_radius), 1e-300))
+        x[STEP_CHI], x[STEP_RADIUS] = cut * step_chi, cut * step_radius
+        if abs(x[STEP_CHI]) * radius + abs(x[STEP_RADIUS]) <= tiny:
+            return SETTLED
+    else:
+        x[HALVINGS] += 1.0
+        x[STEP_CHI] *= 0.5
+        x[STEP_RADIUS] *= 0.5
+        # the best is as good as rounding allows where even a tiny step does not improve it
+        if abs(x[STEP_CHI]) * radius + abs(x[STEP_RADIUS]) <= tiny or x[HALVINGS] > 60.0:
+            return SETTLED if x[MERIT] <= 100.0 * tiny * tiny else GIVES_UP
+    x[CHI], x[RADIUS] = x[BEST_CHI] + x[STEP_CHI], x[BEST_RADIUS] + x[STEP_RADIUS]
+    return GOES_ON
+
+
+@lean
+def _plane_hessian(at: Array, plane: Array) -> tuple[float, float, float]:
+    """ahead' H ahead, ahead' H up, up' H up, of the jet ``at``."""
+    ex, ey, vx, vy = plane[3], plane[4], plane[6], plane[7]
+    xx, xy, yy = at[3], at[4], at[5]
     hx, hy = xx * ex + xy * ey, xy * ex + yy * ey
     return hx * ex + hy * ey, hx * vx + hy * vy, vx * (xx * vx + xy * vy) + vy * (xy * vx + yy * vy)

@@ -60,6 +60,11 @@ class Planes:
         """(n,) True where the plane is upright."""
         return np.asarray(~np.any(self.up[:, :2], axis=1))
 
+    @property
+    def rows(self) -> Array:
+        """(n, 9): centre, ahead and up, as kernels take them."""
+        return np.concatenate([self.centre, self.ahead, self.up], axis=1)
+
     def take(self, index: IntArray) -> Planes:
         """Some of the planes, (k,)."""
         return Planes(self.centre[index], self.ahead[index], self.up[index], self.lean[index], self.flat[index])

@@ -25,8 +25,6 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry.planes import Planes, Section, section
 from bodyplan.gaits.carry.terrain import Terrain
-from bodyplan.ground.heightmap import HeightMap
-from bodyplan.threads import shared
 
 #: relative error of the distance up to which the proof holds
 TOLERANCE = 1e-11
@@ -37,11 +35,10 @@ APART = 1e-4
 #: cells of one wheel kept at a time; more mean that pieces of ground tie
 MOST_CELLS = 512
 _LEVELS = 64
-#: wheels from which on threads share the kernel's work
-_THREADED = 2048
 #: how often a box of the map is cut into four at most
 _CUTS = 9
-_CERTAIN = float(np.sqrt(3.0) - 1.0)
+#: D M below which a contact is the nearest
+CERTAIN = float(np.sqrt(3.0) - 1.0)
 
 
 @dataclass(frozen=True)
@@ -58,47 +55,36 @@ class Found:
 def certain(ground: Terrain, planes: Planes, foot: Section, distance: Array) -> BoolArray:
     """(n,) True where a look at the bounds proves that no other ground is as near as ``distance`` (n,) m; ``foot`` is
     the section at s = 0."""
+    sure = certain_in_region(ground, planes, distance)
     reach = distance * (1.0 + TWICE)
-    if not len(reach):
-        return np.zeros(0, dtype=np.bool_)
-    place = planes.centre[:, :2]
-    _, bend = ground.region_bounds((place - reach[:, None]).min(axis=0), (place + reach[:, None]).max(axis=0))
-    sure = planes.upright & (bend * reach < _CERTAIN)
     rest = np.flatnonzero(~sure)
     if len(rest):
         at = Section(*(getattr(foot, f.name)[rest] for f in fields(Section)))
         known = _known(ground, planes.take(rest), at, np.zeros(len(rest)), reach[rest])
         bends = np.maximum(np.abs(known.low), np.abs(known.high))
-        sure[rest] = known.valid & (bends * reach[rest] < _CERTAIN)
+        sure[rest] = known.valid & (bends * reach[rest] < CERTAIN)
     return sure
+
+
+def certain_in_region(ground: Terrain, planes: Planes, distance: Array) -> BoolArray:
+    """The same by the bounds of the region of all wheels alone: for those that do not lean."""
+    reach = distance * (1.0 + TWICE)
+    if not len(reach):
+        return np.zeros(0, dtype=np.bool_)
+    place = planes.centre[:, :2]
+    _, bend = ground.region_bounds((place - reach[:, None]).min(axis=0), (place + reach[:, None]).max(axis=0))
+    return planes.upright & (bend * reach < CERTAIN)
 
 
 def nearest(ground: Terrain, planes: Planes, guess: Array) -> Found:
     """The nearest ground of every section; ``guess`` (n,) m is where it may be. The ground at s = 0 must be below the
     centre."""
-    if isinstance(ground, HeightMap) and len(planes):
-        return _in_kernel(ground, planes, guess)
     return _Search(ground, planes, guess).run()
 
 
-def _in_kernel(ground: HeightMap, planes: Planes, guess: Array) -> Found:
-    """The same on a height map, wheel by wheel."""
-    from bodyplan.gaits.carry.search_kernel import Land, search
-
-    count, land = len(planes), Land.of(ground)
-    best, value, second = np.empty(count), np.empty(count), np.empty(count)
-    certified = np.empty(count, dtype=np.bool_)
-    centre, ahead, up, start = (np.ascontiguousarray(v) for v in (planes.centre, planes.ahead, planes.up, guess))
-    limits = np.array([TOLERANCE, TWICE, APART, MOST_CELLS, _LEVELS])
-
-    def part(first: int, last: int) -> int:
-        some = slice(first, last)
-        outcome = best[some], value[some], second[some], certified[some]
-        search(land, centre[some], ahead[some], up[some], start[some], limits, *outcome)
-        return 0
-
-    shared(part, count, threaded_from=_THREADED)
-    return Found(best, value, second, certified & one_curve(ground, planes))
+def limits() -> Array:
+    """Numbers of this module that the kernel takes."""
+    return np.array([TOLERANCE, TWICE, APART, MOST_CELLS, _LEVELS])
 
 
 class _Search:
