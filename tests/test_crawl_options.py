@@ -104,7 +104,7 @@ def test_joints_have_time_for_what_they_have_to_do():
 def test_paces_are_the_largest_shares_of_the_rates():
     robot, gait = bp.silo4(), bp.Crawl((0.01, 0.0), cycle_time=12.0, duty=0.85)
     planner = gait.planner(robot, bp.Plane())
-    swing, sway = paces(gait, planner, planner.made(23.9))
+    swing, sway = paces(planner, planner.made(23.9))
     motion = bp.plan(robot, gait, bp.Plane(), bp.times(0, 24, dt=0.01))
     share = np.abs(motion.qd[1200:]).max(axis=1) / (np.pi / 2)
     swinging = motion.contacts[1200:].min(axis=1) < 0.5

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bodyplan.arrays import Array, finite, number
-from bodyplan.errors import InputError, UnknownNameError
+from bodyplan.errors import InputError, Status, UnknownNameError
 from bodyplan.gaits.base import Gait, from_zero
 from bodyplan.gaits.crawl.legs import Legs, legs_of
 from bodyplan.gaits.crawl.motion import motion_of, paces
@@ -171,7 +171,7 @@ class Crawl(Gait):
 
     def planner(self, robot: Robot, ground: Ground) -> Planner:
         """The planner for one robot and ground."""
-        duty = _paced(self, robot) if self.duty is None else self.duty
+        duty = _paced(self._on_level(), robot) if self.duty is None else self.duty
         return self._planner(robot, ground, duty)
 
     def _planner(self, robot: Robot, ground: Ground, duty: float) -> Planner:
@@ -215,6 +215,13 @@ class Crawl(Gait):
             offsets=offsets,
             clearance=KEEP * min(leg.radius for leg in legs.legs) if self.clearance is None else self.clearance,
         )
+
+    def _on_level(self) -> Crawl:
+        """The same gait with those options that make no difference on level ground left out."""
+        options = self.to_dict()
+        for name in ("kind", "start", "heading", "max_slope"):
+            del options[name]
+        return Crawl(**options)
 
     def _order(self, legs: Legs) -> tuple[int, ...]:
         """Numbers of the legs in the order in which they swing: as ``sequence`` says, or from the rear to the front on
@@ -288,8 +295,10 @@ def _paced(gait: Crawl, robot: Robot) -> float:
     count, usual = len(planner.legs), SWINGING
     if not np.isfinite(robot.rates).any():
         return 1.0 - usual / count
-    plan = planner.made((2 * count - 0.5) * planner.step_time)
-    swing, sway = paces(gait, planner, plan)
+    plan = planner.made((count - 0.5) * planner.step_time)
+    if plan.status == Status.OK and not planner.repeats(plan):
+        plan = planner.made((2 * count - 0.5) * planner.step_time)
+    swing, sway = paces(planner, plan)
     least, most = usual * swing / ROOM, 1.0 - (1.0 - usual) * sway / ROOM
     share = float(np.clip(usual, least, most))
     if least > most:

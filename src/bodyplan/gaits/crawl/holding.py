@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
+from bodyplan.gaits.crawl.holding_kernel import held, weighed
 from bodyplan.gaits.crawl.legs import Legs
-from bodyplan.robot.masses import center_from_poses, mass_points
-from bodyplan.spatial import rotate
+from bodyplan.spatial import matrix_from_quaternion
 
 GRAVITY = 9.81
+#: squared width of a stance, as a share of its squared size, below which feet count as standing in a line
+FLAT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,33 +29,36 @@ class Holding:
 def holding(legs: Legs, q: Array, base: Array, standing: BoolArray) -> Holding | None:
     """Statics without friction at ``q`` (T, n), ``base`` (T, 7) with feet ``standing`` (T, m): the loads of least
     square that hold. None for a robot without masses."""
-    robot = legs.robot
-    frames, masses, centres = mass_points(robot)
-    if not len(frames) or not masses.sum() > 0.0:
+    tables = legs.tables
+    mass = float(tables.body[0] + tables.masses.sum())
+    if not mass > 0.0:
         return None
-    poses = robot.forward(q, base).array
-    center = center_from_poses(robot, poses)
-    places = poses[:, frames, :3] + rotate(poses[:, frames, 3:], centres)
-    weight = float(masses.sum()) * GRAVITY
-    parts = [leg.jacobian(poses) for leg in legs.legs]
-    feet = np.stack([part[2] for part in parts], axis=1)
-    loads = np.zeros(standing.shape)
-    for pattern in np.unique(standing, axis=0):
-        rows, on = np.flatnonzero((standing == pattern).all(axis=1)), np.flatnonzero(pattern)
-        away = feet[np.ix_(rows, on)][..., :2] - center[rows, None, :2]
-        balance = np.concatenate([np.ones((len(rows), 1, len(on))), np.swapaxes(away, 1, 2)], axis=1)
-        loads[np.ix_(rows, on)] = weight * np.linalg.pinv(balance)[:, :, 0]
+    q = np.ascontiguousarray(q)
+    center, feet = np.empty((len(q), 3)), np.empty((*standing.shape, 3))
+    weighed(tables, q, center, feet)
+    turn = matrix_from_quaternion(base[:, 3:])
+    away = np.einsum("tij,tmj->tmi", turn[:, :2], feet - center[:, None])
+    loads = mass * GRAVITY * _shares(away, standing)
     torques = np.zeros_like(q)
-    for j, leg in enumerate(legs.legs):
-        axis, place, _, columns = parts[j]
-        chain = set(leg.frames[1:])
-        for k, drive in enumerate(leg.drives):
-            # what lies beyond the drive in its chain
-            beyond = [b for b, frame in enumerate(frames) if frame in chain and frame >= leg.frames[drive.element + 1]]
-            if drive.turns:
-                lifted = np.cross(axis[:, k, None], places[:, beyond] - place[:, k, None])[..., 2]
-            else:
-                lifted = np.repeat(axis[:, k, None, 2], len(beyond), axis=1)
-            torque = GRAVITY * lifted @ masses[beyond] - columns[:, 2, k] * loads[:, j]
-            torques[:, drive.column] += drive.scale * torque
+    held(tables, q, np.ascontiguousarray(turn[:, 2]), loads, GRAVITY, torques)
     return Holding(loads, torques, float(np.abs(torques).max(initial=0.0)))
+
+
+def _shares(away: Array, standing: BoolArray) -> Array:
+    """The shares (T, m) of the weight of least square that feet ``standing`` (T, m) carry, from where they are seen
+    from the centre of mass, ``away`` (T, m, 2) m. Where feet in a line cannot hold it, those of least error."""
+    on = standing.astype(np.float64)
+    count = on.sum(axis=1, keepdims=True)
+    middle = (away * on[..., None]).sum(axis=1, keepdims=True) / count[..., None]
+    off = (away - middle) * on[..., None]
+    x, y = off[..., 0], off[..., 1]
+    xx, xy, yy = ((a * b).sum(axis=1, keepdims=True) for a, b in ((x, x), (x, y), (y, y)))
+    wide = xx * yy - xy * xy
+    flat = ~(wide > FLAT * (xx + yy) ** 2)[:, 0]
+    wide[flat] = 1.0
+    mx, my = middle[..., 0], middle[..., 1]
+    out = on / count - (x * (yy * mx - xy * my) + y * (xx * my - xy * mx)) / wide
+    if flat.any():
+        balance = np.concatenate([np.ones((*away.shape[:2], 1)), away], axis=2)[flat] * on[flat, :, None]
+        out[flat] = np.linalg.pinv(np.swapaxes(balance, 1, 2))[:, :, 0]
+    return np.asarray(out)

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.curves.pieces import lean
 
 #: most steps of Newton, and after how many that do not halve the error it gives up; the error in m at which a foot is
 #: in place; the longest step of a joint (rad, or m)
@@ -25,15 +26,17 @@ THETA, D, A, EPSILON = 0, 1, 2, 3
 class Tables(NamedTuple):
     """All legs of a robot, row after row. ``starts`` (m + 1,): where rows of legs begin. Of every row and variable
     (theta, d, a, epsilon): ``joints`` (R, 4) that drive it and which of the leg's three ``slots`` they are in (-1:
-    none), ``values`` (R, 4) at 0 and ``scales`` (R, 4); ``masses`` (R,) kg of the frames after rows and their
-    ``centres`` (R, 3) m. Of every leg: ``columns`` (m, 3) of its actuated joints and the foot's place ``local``
-    (m, 3) m in its last frame. ``body`` (4,): mass kg of the base and its centre m."""
+    none), ``values`` (R, 4) at 0 and ``scales`` (R, 4); ``turns`` (R, 4): cosine and sine of theta and of epsilon,
+    where no joint drives them; ``masses`` (R,) kg of the frames after rows and their ``centres`` (R, 3) m. Of every
+    leg: ``columns`` (m, 3) of its actuated joints and the foot's place ``local`` (m, 3) m in its last frame. ``body``
+    (4,): mass kg of the base and its centre m."""
 
     starts: IntArray
     joints: IntArray
     slots: IntArray
     values: Array
     scales: Array
+    turns: Array
     masses: Array
     centres: Array
     columns: IntArray
@@ -51,24 +54,26 @@ class Postures(NamedTuple):
     sides: IntArray
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def chain(T: Tables, leg: int, q: Array, F: Array) -> None:
     """Frames ``F`` (rows + 1, 12) of a leg at ``q`` (n,), that of the base first."""
     first = T.starts[leg]
-    F[0, :] = 0.0
-    F[0, 3] = F[0, 7] = F[0, 11] = 1.0
+    for i in range(12):
+        F[0, i] = 1.0 if i in (3, 7, 11) else 0.0
     for k in range(T.starts[leg + 1] - first):
         r = first + k
-        theta, d, a, epsilon = T.values[r, 0], T.values[r, 1], T.values[r, 2], T.values[r, 3]
+        c, s, ce, se = T.turns[r, 0], T.turns[r, 1], T.turns[r, 2], T.turns[r, 3]
+        d, a = T.values[r, 1], T.values[r, 2]
         if T.joints[r, 0] >= 0:
-            theta += T.scales[r, 0] * q[T.joints[r, 0]]
+            theta = T.values[r, 0] + T.scales[r, 0] * q[T.joints[r, 0]]
+            c, s = math.cos(theta), math.sin(theta)
         if T.joints[r, 1] >= 0:
             d += T.scales[r, 1] * q[T.joints[r, 1]]
         if T.joints[r, 2] >= 0:
             a += T.scales[r, 2] * q[T.joints[r, 2]]
         if T.joints[r, 3] >= 0:
-            epsilon += T.scales[r, 3] * q[T.joints[r, 3]]
-        c, s, ce, se = math.cos(theta), math.sin(theta), math.cos(epsilon), math.sin(epsilon)
+            epsilon = T.values[r, 3] + T.scales[r, 3] * q[T.joints[r, 3]]
+            ce, se = math.cos(epsilon), math.sin(epsilon)
         for i in range(3):
             x, y, z = F[k, 3 + 3 * i], F[k, 4 + 3 * i], F[k, 5 + 3 * i]
             ahead, left = c * x + s * y, c * y - s * x
@@ -78,7 +83,7 @@ def chain(T: Tables, leg: int, q: Array, F: Array) -> None:
             F[k + 1, 5 + 3 * i] = ce * z - se * left
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def moves(T: Tables, leg: int, F: Array, foot: Array, S: Array) -> None:
     """The place ``foot`` (3,) of a leg with frames ``F``, and how it moves with its three joints, ``S`` (3, 3)."""
     first, count = T.starts[leg], T.starts[leg + 1] - T.starts[leg]
@@ -104,7 +109,7 @@ def moves(T: Tables, leg: int, F: Array, foot: Array, S: Array) -> None:
             S[2, slot] += scale * z
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def volume(S: Array) -> float:
     """Determinant of ``S`` (3, 3)."""
     return float(
@@ -114,7 +119,7 @@ def volume(S: Array) -> float:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def side_of(S: Array) -> int:
     """1 or -1: to which side a leg is bent, the sign of the determinant of ``S`` (3, 3); 0 where it is singular."""
     size = 1.0
@@ -129,9 +134,15 @@ def side_of(S: Array) -> int:
 @njit(cache=True, nogil=True)
 def solve(S: Array, b: Array, x: Array) -> None:
     """``x`` (3,) of S x = b by Cramer's rule; the least x of least error where ``S`` is all but singular."""
-    if side_of(S) == 0:
+    if not regular(S, b, x):
         x[:] = np.linalg.pinv(S, SINGULAR) @ b
-        return
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def regular(S: Array, b: Array, x: Array) -> bool:
+    """``x`` (3,) of S x = b by Cramer's rule; False where ``S`` is all but singular."""
+    if side_of(S) == 0:
+        return False
     v = volume(S)
     for j in range(3):
         k, m = (j + 1) % 3, (j + 2) % 3
@@ -140,6 +151,7 @@ def solve(S: Array, b: Array, x: Array) -> None:
             + b[1] * (S[2, k] * S[0, m] - S[0, k] * S[2, m])
             + b[2] * (S[0, k] * S[1, m] - S[1, k] * S[0, m])
         ) / v
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -165,7 +177,8 @@ def newton(T: Tables, leg: int, q: Array, target: Array, side: int, F: Array, W:
                 found[j] = q[columns[j]]
         if not (best > PLACED * scale and idle < PATIENCE):
             break
-        solve(S, off, step)
+        if not regular(S, off, step):
+            solve(S, off, step)
         longest = max(abs(step[0]), abs(step[1]), abs(step[2]))
         share = min(1.0, STRIDE / max(longest, 1e-300))
         for j in range(3):
@@ -181,11 +194,15 @@ def placed(
 ) -> bool:
     """The joints of a leg in ``q`` (n,) for its foot at ``target`` (3,): by Newton from ``guess`` (n,), or else from
     the posture on the same side whose foot is nearest. Whether it comes there."""
-    columns = T.columns[leg]
     for j in range(3):
-        q[columns[j]] = guess[columns[j]]
+        q[T.columns[leg, j]] = guess[T.columns[leg, j]]
     if newton(T, leg, q, target, side, F, W):
         return True
+    return _placed_from_afar(T, P, leg, q, target, side, F, W)
+
+
+@njit(cache=True, nogil=True)
+def _placed_from_afar(T: Tables, P: Postures, leg: int, q: Array, target: Array, side: int, F: Array, W: Array) -> bool:
     nearest, far = -1, np.inf
     for k in range(P.starts[leg], P.starts[leg + 1]):
         if P.sides[k] == side:
@@ -195,6 +212,7 @@ def placed(
                 nearest, far = k, d
     if nearest < 0:
         return False
+    columns = T.columns[leg]
     kept = (q[columns[0]], q[columns[1]], q[columns[2]])
     for j in range(3):
         q[columns[j]] = P.sets[nearest, j]
@@ -244,13 +262,13 @@ def place(T: Tables, P: Postures, targets: Array, guess: Array, q: Array, came: 
                 came[b, leg] = placed(T, P, leg, q[b], guess, target, bent[leg], F, W)
 
 
-@njit(cache=True, nogil=True)
+@lean
 def same(a: Array, b: Array) -> bool:
     """Whether two points (3,) are the same."""
     return bool(a[0] == b[0] and a[1] == b[1] and a[2] == b[2])
 
 
-@njit(cache=True, nogil=True)
+@lean
 def moment(T: Tables, leg: int, F: Array, out: Array) -> None:
     """Add the masses of a leg with frames ``F`` times their places, kg m in the base, to ``out`` (3,)."""
     first = T.starts[leg]
@@ -264,14 +282,14 @@ def moment(T: Tables, leg: int, F: Array, out: Array) -> None:
                 out[i] += mass * place
 
 
-@njit(cache=True, nogil=True)
+@lean
 def drift(T: Tables, leg: int, qd: Array, F: Array, out: Array) -> None:
     """Acceleration ``out`` (3,) of the foot of a leg with frames ``F`` where joints move with rates ``qd`` (n,) and
     none accelerates: carried along the chain, row by row."""
     first, count = T.starts[leg], T.starts[leg + 1] - T.starts[leg]
     # angular velocity and acceleration so far
     wx = wy = wz = gx = gy = gz = 0.0
-    out[:] = 0.0
+    out[0] = out[1] = out[2] = 0.0
     for k in range(count + 1):
         tx = ty = tz = 0.0  # velocity of slides
         if k < count:

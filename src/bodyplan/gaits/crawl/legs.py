@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.arrays import Array, BoolArray, IntArray, frozen
 from bodyplan.errors import InputError
 from bodyplan.gaits.crawl import leg_kernel
 from bodyplan.gaits.crawl.leg_kernel import SINGULAR, Postures, Tables
@@ -227,6 +227,7 @@ class Legs:
             slots.astype(np.int64),
             values,
             scales,
+            np.stack([turn(values[:, v]) for v in (0, 3) for turn in (np.cos, np.sin)], axis=1),
             weight[after],
             middle[after],
             np.stack([leg.columns for leg in legs]),
@@ -290,3 +291,12 @@ def stance_guess(legs: Legs, targets: Array) -> Array:
         near = off <= off.min() + 0.08 * float(np.linalg.norm(target - root))
         q[leg.columns] = sets[int(np.where(near, tops, -np.inf).argmax())]
     return q
+
+
+@lru_cache(maxsize=32)
+def stance_of(legs: Legs, places: bytes) -> Array:
+    """Joints (n,) of a stance with knees up and feet at ``places``, the bytes of (m, 3) m in the base, as near as can
+    be; remembered."""
+    targets = np.frombuffer(places).reshape(-1, 3).copy()
+    q, _ = legs.place(targets[None], stance_guess(legs, targets))
+    return frozen(q[0])

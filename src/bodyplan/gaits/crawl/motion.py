@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.crawl.holding import holding
+from bodyplan.gaits.crawl.legs import Legs, cross
 from bodyplan.gaits.crawl.planner import Plan, Planner
-from bodyplan.gaits.crawl.steps import blend
-from bodyplan.gaits.crawl.verdict import base_of, seen_from
+from bodyplan.gaits.crawl.poses import base_of, seen_from, turned_back
+from bodyplan.gaits.crawl.steps import blend, swing_path
 from bodyplan.motion import Claim, Motion
-from bodyplan.spatial import rotate
-from bodyplan.spatial.rotations import conjugate
 
 if TYPE_CHECKING:
     from bodyplan.gaits.crawl.gait import Crawl
@@ -26,42 +25,11 @@ BETWEEN = 1e-4
 
 def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float | None) -> Motion:
     """The motion of a planned crawl at times ``t`` (T,) s; ``period`` s where it repeats."""
-    robot, count = planner.legs.robot, len(planner.legs)
-    poses, first, second = _body(plan, t)
-    feet = np.repeat(plan.feet[None], len(t), axis=0)
-    speed, change = np.zeros_like(feet), np.zeros_like(feet)
-    standing = np.ones((len(t), count), dtype=bool)
-    for step in plan.steps:
-        after = t >= step.lift_off
-        feet[after] = step.before
-        span = step.touch_down - step.lift_off
-        under_way = np.flatnonzero((t > step.lift_off) & (t < step.touch_down))
-        if len(under_way):
-            tau = (t[under_way] - step.lift_off) / span
-            place, velocity, acceleration = step.foot(tau)
-            feet[under_way, step.leg] = place
-            speed[under_way, step.leg] = velocity / span
-            change[under_way, step.leg] = acceleration / span**2
-            standing[under_way, step.leg] = False
-        feet[t >= step.touch_down] = step.after
-    base = base_of(poses)
-    turn, gain = _spin(poses, first, second)
-    back = conjugate(base[:, None, 3:])
-    seen = seen_from(base, feet)
-    w, dw = turn[:, None], gain[:, None]
-    moving = rotate(back, speed - first[:, None, :3]) - np.cross(w, seen)
-    rising = (
-        rotate(back, change - second[:, None, :3])
-        - 2.0 * np.cross(w, moving)
-        - np.cross(dw, seen)
-        - np.cross(w, np.cross(w, seen))
-    )
-    q, placed = planner.legs.place(seen, plan.guess)
+    robot = planner.legs.robot
+    at = _joints(planner.legs, plan, t)
+    base, feet, standing, q, qd, placed = at.base, at.feet, at.standing, at.q, at.qd, at.placed
     solved = np.asarray(placed.all(axis=1))
-    qd, qdd = np.zeros_like(q), np.zeros_like(q)
-    if solved.any():
-        qd[solved], qdd[solved] = planner.legs.rates(q[solved], moving[solved], rising[solved])
-    residual = np.linalg.norm(planner.legs.feet(q) - seen, axis=-1).max(axis=1)
+    residual = np.linalg.norm(planner.legs.feet(q) - at.seen, axis=-1).max(axis=1)
     status = np.full(len(t), Status.OK.value, dtype="U24")
     limits = robot.limits
     beyond = (q < limits[:, 0] - EXACT) | (q > limits[:, 1] + EXACT)
@@ -85,7 +53,7 @@ def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float
         base=base,
         q=q,
         qd=qd,
-        qdd=qdd,
+        qdd=at.qdd,
         residual=np.where(solved, residual, 0.0),
         status=status,
         claims=tuple(_claims(planner, plan, t, feet[..., 2], period)),
@@ -98,7 +66,7 @@ def motion_of(gait: Crawl, planner: Planner, plan: Plan, t: Array, period: float
     )
 
 
-def paces(gait: Crawl, planner: Planner, plan: Plan) -> tuple[float, float]:
+def paces(planner: Planner, plan: Plan) -> tuple[float, float]:
     """Largest joint rates over their limits while a leg swings, and while the body moves, in the last cycle of a plan;
     0 without one."""
     steps = plan.steps[-len(planner.legs) :]
@@ -108,27 +76,87 @@ def paces(gait: Crawl, planner: Planner, plan: Plan) -> tuple[float, float]:
     spans = [(step.lift_off, step.touch_down) for step in steps] + [(step.begin, step.lift_off) for step in steps]
     t = np.concatenate([start + (end - start) * tau for start, end in spans])
     times, back = np.unique(t, return_inverse=True)
-    fast = np.abs(motion_of(gait, planner, plan, times, None).qd) / planner.legs.robot.rates
+    fast = np.abs(_joints(planner.legs, plan, times).qd) / planner.legs.robot.rates
     most = fast.max(axis=1)[back].reshape(2, -1).max(axis=1)
     return float(most[0]), float(most[1])
 
 
+class _Joints(NamedTuple):
+    """A plan at times: ``base`` (T, 7); ``feet`` (T, m, 3) m in the world, ``seen`` from the base; which are
+    ``standing`` (T, m); joints ``q``, ``qd``, ``qdd`` (T, n), and which feet are ``placed`` (T, m) by them."""
+
+    base: Array
+    feet: Array
+    seen: Array
+    standing: BoolArray
+    q: Array
+    qd: Array
+    qdd: Array
+    placed: BoolArray
+
+
+def _joints(legs: Legs, plan: Plan, t: Array) -> _Joints:
+    poses, first, second = _body(plan, t)
+    feet, speed, change, standing = _feet(plan, t)
+    base = base_of(poses)
+    w, dw = (v[:, None] for v in _spin(poses, first, second))
+    seen = seen_from(base, feet)
+    moving = turned_back(base, speed - first[:, None, :3]) - cross(w, seen)
+    rising = (
+        turned_back(base, change - second[:, None, :3])
+        - 2.0 * cross(w, moving)
+        - cross(dw, seen)
+        - cross(w, cross(w, seen))
+    )
+    q, placed = legs.place(seen, plan.guess)
+    solved = placed.all(axis=1)
+    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    qd[solved], qdd[solved] = legs.rates(q[solved], moving[solved], rising[solved])
+    return _Joints(base, feet, seen, standing, q, qd, qdd, placed)
+
+
+def _feet(plan: Plan, t: Array) -> tuple[Array, Array, Array, BoolArray]:
+    """Places m, velocities and accelerations (T, m, 3) of the feet, and which of them stand (T, m)."""
+    stands = np.array([plan.feet, *(step.after for step in plan.steps)])
+    done = np.searchsorted([step.touch_down for step in plan.steps], t, side="right")
+    feet = stands[done]
+    speed, change = np.zeros_like(feet), np.zeros_like(feet)
+    standing = np.ones(feet.shape[:2], dtype=bool)
+    if plan.steps:
+        rows = np.flatnonzero(done < len(plan.steps))
+        lift_off = np.array([step.lift_off for step in plan.steps])
+        rows = rows[t[rows] > lift_off[done[rows]]]
+        which = done[rows]
+        leg, lift, early, span = np.array(
+            [(step.leg, step.lift, step.early, step.touch_down - step.lift_off) for step in plan.steps]
+        )[which].T
+        swinging = rows, leg.astype(np.int64)
+        tau = (t[rows] - lift_off[which]) / span
+        path = swing_path(feet[swinging], stands[which + 1, swinging[1]], lift, early, tau)
+        feet[swinging], speed[swinging], change[swinging] = (
+            path[0],
+            path[1] / span[:, None],
+            path[2] / span[:, None] ** 2,
+        )
+        standing[swinging] = False
+    return feet, speed, change, standing
+
+
 def _body(plan: Plan, t: Array) -> tuple[Array, Array, Array]:
     """x, y, z, roll, pitch, yaw (T, 6) and their first and second derivatives."""
-    poses = np.repeat(plan.first[None], len(t), axis=0)
-    first, second = np.zeros_like(poses), np.zeros_like(poses)
-    before = plan.first
-    for step in plan.steps:
-        rows = np.flatnonzero(t > step.begin)
-        span = step.lift_off - step.begin
-        value, rate, gain = blend(np.clip((t[rows] - step.begin) / span, 0.0, 1.0))
-        way = step.pose - before
-        poses[rows] = before + value[:, None] * way
-        moving = t[rows] < step.lift_off
-        first[rows] = (rate * moving)[:, None] * way / span
-        second[rows] = (gain * moving)[:, None] * way / span**2
-        before = step.pose
-    return poses, first, second
+    rests = np.array([plan.first, *(step.pose for step in plan.steps)])
+    if not plan.steps:
+        return np.repeat(rests, len(t), axis=0), np.zeros((len(t), 6)), np.zeros((len(t), 6))
+    begin, end = np.array([(step.begin, step.lift_off) for step in plan.steps]).T
+    which = np.searchsorted(begin, t, side="left") - 1
+    begun = which >= 0
+    which = np.maximum(which, 0)
+    span = (end - begin)[which]
+    value, rate, gain = blend(np.clip((t - begin[which]) / span, 0.0, 1.0))
+    moving = begun & (t < end[which])
+    way = rests[which + 1] - rests[which]
+    poses = rests[which] + value[:, None] * way
+    return poses, (rate * moving / span)[:, None] * way, (gain * moving / span**2)[:, None] * way
 
 
 def _spin(poses: Array, first: Array, second: Array) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray, number
 from bodyplan.errors import UnknownNameError
 from bodyplan.gaits.crawl.planner import Planner
+from bodyplan.gaits.crawl.poses import base_of, seen_from
 from bodyplan.gaits.crawl.steps import Step
-from bodyplan.gaits.crawl.verdict import base_of, seen_from
 from bodyplan.ground.base import Ground
 from bodyplan.robot.masses import center_of_mass
 from bodyplan.robot.model import Robot

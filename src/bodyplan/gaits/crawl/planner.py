@@ -13,8 +13,9 @@ import numpy as np
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status
 from bodyplan.gaits.crawl.footholds import Footholds
-from bodyplan.gaits.crawl.legs import Legs, stance_guess
-from bodyplan.gaits.crawl.shell import Shell, shell_of
+from bodyplan.gaits.crawl.legs import Legs, stance_of
+from bodyplan.gaits.crawl.poses import over, plane_through
+from bodyplan.gaits.crawl.shell import Shell, needed_by, shell_of
 from bodyplan.gaits.crawl.steps import Course, Step, clear_swing, clear_swings, first_swings, swing_path
 from bodyplan.gaits.crawl.sway_kernel import sways
 from bodyplan.gaits.crawl.verdict import Failure, Lookout
@@ -37,8 +38,8 @@ AHEAD = 0.4
 MOST_STEPS = 20_000
 #: most steps that are planned at once, as if the first way of making each were good
 AT_ONCE = 16
-#: m of distances that rounding may change
-EXACT = 1e-9
+#: m of distances that rounding may change; m and rad of poses that are told apart
+EXACT, SAME = 1e-9, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +92,11 @@ class Planner:
     _spots: dict[int, Footholds] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        stance = self.offsets - [0.0, 0.0, self.height]
-        q, _ = self.legs.place(stance[None], stance_guess(self.legs, stance))
-        self.guess = q[0]
+        self.guess = stance_of(self.legs, (self.offsets - [0.0, 0.0, self.height]).tobytes()).copy()
         self.shell = shell_of(self.legs)
         self.needed, self.lookout = np.zeros(0), None
         if self.shell is not None:
-            self.needed = self.shell.needed(self.guess, self.clearance)
+            self.needed = needed_by(self.shell, self.guess.tobytes(), self.clearance)
             self.lookout = Lookout(self.legs, self.ground, self.shell, self.guess, self.needed)
 
     @property
@@ -114,6 +113,9 @@ class Planner:
             )
         count = len(self.legs)
         feet, failure = np.zeros((count, 3)), Failure()
+        total = math.ceil(until / self.step_time)
+        total += (total * self.step_time < until) - ((total - 1) * self.step_time >= until > 0.0)
+        self._look_ahead(-1 - count, min(total, AT_ONCE))
         for place, leg in enumerate(self.order):
             feet[leg], why = self._footholds(place - count).first
             if why:
@@ -121,8 +123,6 @@ class Planner:
                 failure = Failure(Status.NO_CONTACT, reason, 0.0)
         first, begun = self._before(feet), feet
         steps: list[Step] = []
-        total = math.ceil(until / self.step_time)
-        total += (total * self.step_time < until) - ((total - 1) * self.step_time >= until > 0.0)
         before, at_once = first, AT_ONCE
         while failure.status == Status.OK and len(steps) < total:
             ways: list[_Way | None] = [*self._ahead(len(steps), feet, before, min(at_once, total - len(steps)))]
@@ -137,6 +137,16 @@ class Planner:
             # where the first ways are no good, less is planned at once
             at_once = min(2 * at_once, AT_ONCE) if kept >= len(ways) else max(kept, 1)
         return Plan(self.legs, first, begun, tuple(steps), self.guess, failure.status, failure.reason, failure.time)
+
+    def repeats(self, plan: Plan) -> bool:
+        """Whether a plan of one cycle on level ground goes on as it began: its last step leads to where its first one
+        came from, but for rounding."""
+        poses = np.array([plan.first, plan.steps[-1].pose])
+        at, heading = self.course.along(np.array([-1, len(plan.steps) - 1]) * self.step_time)
+        c, s = np.cos(heading), np.sin(heading)
+        x, y = (poses[:, :2] - at).T
+        poses[:, 0], poses[:, 1], poses[:, 5] = c * x + s * y, c * y - s * x, poses[:, 5] - heading
+        return bool(np.abs(poses[1] - poses[0]).max() <= SAME)
 
     def _before(self, feet: Array) -> Array:
         """Pose (6,) of the body at the end of the step before the first, in which the last leg has come to its place
@@ -196,8 +206,7 @@ class Planner:
         """What comes too near to anything in steps from step ``n`` on, after the body's poses ``before`` (6,)."""
         if self.lookout is None or not steps:
             return [None] * len(steps)
-        later = np.array([self._later(step, n + k) for k, step in enumerate(steps)])
-        return self.lookout.verdicts(steps, np.array(before), later)
+        return self.lookout.verdicts(steps, np.array(before), self._later(steps, n))
 
     def _step(self, n: int, feet: Array, before: Array, way: _Way | None) -> Step | Failure | None:
         """Step ``n``, in which a leg swings while the others stay at ``feet`` (m, 3), after the body's pose ``before``
@@ -289,15 +298,22 @@ class Planner:
             return Failure(Status.TIPS_OVER, reason, begin)
         return Step(leg, begin, lift_off, lift_off + self.swing_time, pose, feet, after, *swing, margin, share)
 
-    def _later(self, step: Step, n: int) -> Array:
-        """Guesses (k, 6) of the body's poses in the steps after step ``n`` until its leg swings again, with more and
-        less sway."""
-        ways, feet = [], step.after[:, :2].sum(axis=0)
-        for k in range(n + 1, n + len(self.legs)):
-            at, heading = self.course.at(k * self.step_time)
-            way = (feet - step.after[self.order[k % len(self.legs)], :2]) / (len(self.legs) - 1) - at
-            ways += [(*(at + share * way), heading) for share in (0.0, step.share, AHEAD)]
-        return self.over(self.plane(step.after), np.array(ways))
+    def _later(self, steps: Sequence[Step], n: int) -> Array:
+        """Guesses (s, k, 6) of the body's poses in the steps after each of some steps, from step ``n`` on, until its
+        leg swings again, with more and less sway."""
+        count = len(self.legs)
+        numbers = n + np.arange(len(steps))[:, None] + np.arange(1, count)
+        at, heading = self.course.along(np.asarray(numbers * self.step_time))
+        after = np.array([step.after[:, :2] for step in steps])
+        swinging = np.array(self.order)[numbers % count]
+        centroid = (after.sum(axis=1)[:, None] - np.take_along_axis(after, swinging[..., None], axis=1)) / (count - 1)
+        shares = np.array([(0.0, step.share, AHEAD) for step in steps])[:, None, :, None]
+        ways = np.empty((*numbers.shape, 3, 3))
+        ways[..., :2] = at[:, :, None] + shares * (centroid - at)[:, :, None]
+        ways[..., 2] = heading[..., None]
+        return np.array(
+            [self.over(self.plane(step.after), way.reshape(-1, 3)) for step, way in zip(steps, ways, strict=True)]
+        )
 
     def _footholds(self, n: int) -> Footholds:
         """Those of the foot that swings in step ``n``: below where the body will be in the middle of its stance, or
@@ -310,18 +326,18 @@ class Planner:
         """Judge the footholds of steps from ``first`` up to ``last`` at once; those of steps before are done with."""
         spots = {n: known for n, known in self._spots.items() if n >= first}
         new = [n for n in range(first, last) if n not in spots]
-        spots |= {n: self._footholds_of(n) for n in new}
         if new:
+            count, numbers = len(self.legs), np.array(new)
+            at, heading = self.course.along((numbers + 0.5 * count) * self.step_time)
+            legs = np.array(self.order)[numbers % count]
+            c, s = np.cos(heading), np.sin(heading)
+            x, y = self.offsets[legs, :2].T
+            nominal = at + np.stack([c * x - s * y, s * x + c * y], axis=1)
+            for n, leg, place in zip(new, legs, nominal, strict=True):
+                radius = self.legs.legs[leg].radius
+                spots[n] = Footholds(self.ground, place, radius, self.gait.max_slope, self.search)
             Footholds.look_ahead([spots[n] for n in new])
         self._spots = spots
-
-    def _footholds_of(self, n: int) -> Footholds:
-        leg = self.order[n % len(self.legs)]
-        at, heading = self.course.at((n + 0.5 * len(self.legs)) * self.step_time)
-        c, s = np.cos(heading), np.sin(heading)
-        x, y = self.offsets[leg, :2]
-        nominal = at + np.array([c * x - s * y, s * x + c * y])
-        return Footholds(self.ground, nominal, self.legs.legs[leg].radius, self.gait.max_slope, self.search)
 
     def _body(
         self, leg: int, n: float, before: Array, after: Array, shape: tuple[float, float], rise: float = 0.0
@@ -363,25 +379,12 @@ class Planner:
         return int(np.where(good, least, -np.inf).argmax())
 
     def plane(self, feet: Array) -> Array:
-        """(3,) slopes along x and y, and height m at the origin, of the plane through the ground below all ``feet``
-        (m, 3), at best."""
-        ground = feet - self.legs.radii[:, None] * [0.0, 0.0, 1.0]
-        design = np.concatenate([ground[:, :2], np.ones((len(ground), 1))], axis=1)
-        return np.asarray(np.linalg.lstsq(design, ground[:, 2], rcond=None)[0])
+        """:func:`plane_through` the ground below all ``feet`` (m, 3)."""
+        return plane_through(feet - self.legs.radii[:, None] * [0.0, 0.0, 1.0])
 
     def over(self, plane: Array, ways: Array) -> Array:
-        """(k, 6) x, y, z, roll, pitch, yaw at x, y, yaw (k, 3) over a :meth:`plane`, level or along it."""
-        gx, gy, g0 = plane
-        x, y, heading = ways.T
-        out = np.zeros((len(ways), 6))
-        out[:, 0], out[:, 1], out[:, 5] = x, y, heading
-        out[:, 2] = gx * x + gy * y + g0 + self.height + float(self.legs.radii.mean())
-        if self.gait.body == "follow":
-            c, s = np.cos(heading), np.sin(heading)
-            ahead, left = gx * c + gy * s, -gx * s + gy * c
-            out[:, 4] = -np.arctan(ahead)
-            out[:, 3] = np.arctan(left * np.cos(out[:, 4]))
-        return out
+        """:func:`over` a :meth:`plane` as high as the body is, level or along it."""
+        return over(plane, ways, self.height + float(self.legs.radii.mean()), self.gait.body == "follow")
 
     def pose(self, at: Array, heading: float, feet: Array) -> Array:
         """(6,) x, y, z, roll, pitch, yaw over the plane through all feet, level or along it."""

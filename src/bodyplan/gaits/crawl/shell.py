@@ -7,10 +7,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.arrays import Array, BoolArray, IntArray, frozen
 from bodyplan.errors import InputError
 from bodyplan.gaits.crawl.legs import Legs
-from bodyplan.gaits.crawl.shell_kernel import last_moved, nearest_slim, nearest_to_box, placed
+from bodyplan.gaits.crawl.shell_kernel import around, last_moved, nearest_slim, nearest_to_box, placed
 from bodyplan.ground.base import Ground
 from bodyplan.ground.field import Field
 from bodyplan.ground.near import clearance_up_to, segment_clearance_up_to
@@ -103,12 +103,15 @@ class Shell:
         slim, boxed = self._pairs
         every = tuple(range(len(self.legs.robot.contacts)))
         ends, (_, radii) = self._ends(poses, every), self._skeletons
-        best, pair, _ = nearest_slim(ends, radii, slim, most)
+        balls = np.empty((*ends.shape[:2], 4))
+        around(ends, radii, balls)
+        best, pair, _ = nearest_slim(ends, radii, balls, slim, most)
         names = (self._contact(slim[pair, 0]).name, self._contact(slim[pair, 1]).name) if best < most else ("", "")
         for box, others in boxed:
             shape = self._contact(box)
             at = np.ascontiguousarray(poses[:, self._frames[box]])
-            gap, other, _ = nearest_to_box(at, np.array(shape.start), np.array(shape.half), ends, radii, others, best)
+            middle, half = np.array(shape.start), np.array(shape.half)
+            gap, other, _ = nearest_to_box(at, middle, half, ends, radii, balls, others, best)
             if gap < best:
                 best, names = gap, (shape.name, self._contact(others[other]).name)
         return float(best), names
@@ -212,6 +215,12 @@ def _far(ground: Ground, points: Array, caps: Array) -> BoolArray:
     around = (np.clip(corner, edge_low, edge_high) for corner in (low[:, :2] - reach, high[:, :2] + reach))
     top = ground.field_bounds(*around).z[1]
     return np.asarray(low[:, 2] - top > reach[:, 0])
+
+
+@lru_cache(maxsize=32)
+def needed_by(shell: Shell, stance: bytes, keep: float) -> Array:
+    """:meth:`Shell.needed` of a ``stance``, the bytes of (n,), remembered."""
+    return frozen(shell.needed(np.frombuffer(stance).copy(), keep))
 
 
 def _edges(box: Contact) -> IntArray:

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, IntArray
+from bodyplan.curves.pieces import lean
 from bodyplan.spatial.segments import apart, from_box
 
 
@@ -21,7 +22,7 @@ def placed(poses: Array, frames: IntArray, local: Array, out: Array) -> None:
                 _moved(at, local[c, p], out[s, c, p])
 
 
-@njit(cache=True, nogil=True)
+@lean
 def _moved(at: Array, v: Array, out: Array) -> None:
     """The point ``v`` (3,) of a frame with pose ``at`` (7,), in the world."""
     w, x, y, z = at[3], at[4], at[5], at[6]
@@ -32,19 +33,17 @@ def _moved(at: Array, v: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def nearest_slim(ends: Array, radii: Array, pairs: IntArray, most: float) -> tuple[float, int, int]:
+def nearest_slim(ends: Array, radii: Array, balls: Array, pairs: IntArray, most: float) -> tuple[float, int, int]:
     """The smallest gap m below ``most`` m of ``pairs`` (n, 2) of capsules with ``ends`` (S, c, 2, 3) and ``radii``
-    (c,), which pair that is and in which sample; ``most`` where no gap is smaller."""
+    (c,) in their ``balls`` (S, c, 4), which pair that is and in which sample; ``most`` where no gap is smaller."""
     best, which, when = most, 0, 0
     for k in range(len(pairs)):
-        i, j = pairs[k]
+        i, j = pairs[k, 0], pairs[k, 1]
         for s in range(len(ends)):
-            p, q = ends[s, i], ends[s, j]
-            touch = radii[i] + radii[j]
             # balls around them are nearer than they are
-            if _between(p, q) - _reach(p) - _reach(q) - touch >= best:
+            if between(balls, s, i, j) >= best:
                 continue
-            gap = apart(p, q) - touch
+            gap = apart(ends[s, i], ends[s, j]) - (radii[i] + radii[j])
             if gap < best:
                 best, which, when = gap, k, s
     return best, which, when
@@ -52,26 +51,27 @@ def nearest_slim(ends: Array, radii: Array, pairs: IntArray, most: float) -> tup
 
 @njit(cache=True, nogil=True)
 def nearest_to_box(
-    poses: Array, middle: Array, half: Array, ends: Array, radii: Array, slim: IntArray, most: float
+    poses: Array, middle: Array, half: Array, ends: Array, radii: Array, balls: Array, slim: IntArray, most: float
 ) -> tuple[float, int, int]:
     """The smallest gap m below ``most`` m of a box, with ``half`` sizes (3,) around ``middle`` (3,) in a frame with
     ``poses`` (S, 7), to the ``slim`` (k,) among capsules as in :func:`nearest_slim`, which of these that is and in
     which sample."""
     best, which, when = most, 0, 0
-    local = np.empty((2, 3))
-    back = np.empty(7)
-    back[:3] = 0.0
+    local, back, away = np.empty((2, 3)), np.zeros(7), np.empty(3)
     corner = math.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2)
-    centre, away = np.empty((2, 3)), np.empty(3)
+    centres = np.empty((len(poses), 3))
+    for s in range(len(poses)):
+        _moved(poses[s], middle, centres[s])
     for k in range(len(slim)):
         c = slim[k]
         for s in range(len(ends)):
-            _moved(poses[s], middle, centre[0])
-            centre[1] = centre[0]
-            if _between(ends[s, c], centre) - _reach(ends[s, c]) - corner - radii[c] >= best:
+            x, y = balls[s, c, 0] - centres[s, 0], balls[s, c, 1] - centres[s, 1]
+            z = balls[s, c, 2] - centres[s, 2]
+            if math.sqrt(x * x + y * y + z * z) - balls[s, c, 3] - corner >= best:
                 continue
             back[3] = poses[s, 3]
-            back[4:] = -poses[s, 4:]
+            for i in range(3):
+                back[4 + i] = -poses[s, 4 + i]
             for p in range(2):
                 for i in range(3):
                     away[i] = ends[s, c, p, i] - poses[s, i]
@@ -82,6 +82,27 @@ def nearest_to_box(
             if gap < best:
                 best, which, when = gap, k, s
     return best, which, when
+
+
+@njit(cache=True, nogil=True)
+def around(ends: Array, radii: Array, balls: Array) -> None:
+    """The ``balls`` (S, c, 4), middle and radius, around capsules with ``ends`` (S, c, 2, 3) and ``radii`` (c,)."""
+    for s in range(len(ends)):
+        for c in range(len(radii)):
+            square = 0.0
+            for i in range(3):
+                a, b = ends[s, c, 0, i], ends[s, c, 1, i]
+                balls[s, c, i] = 0.5 * (a + b)
+                square += (b - a) * (b - a)
+            balls[s, c, 3] = 0.5 * math.sqrt(square) + radii[c]
+
+
+@lean
+def between(balls: Array, s: int, i: int, j: int) -> float:
+    """Gap of two of the ``balls`` (S, c, 4) in a sample."""
+    x, y = balls[s, i, 0] - balls[s, j, 0], balls[s, i, 1] - balls[s, j, 1]
+    z = balls[s, i, 2] - balls[s, j, 2]
+    return float(math.sqrt(x * x + y * y + z * z) - balls[s, i, 3] - balls[s, j, 3])
 
 
 @njit(cache=True, nogil=True)
@@ -96,18 +117,3 @@ def last_moved(points: Array, out: IntArray) -> None:
                         break
                 else:
                     out[s, c] = out[s - 1, c]
-
-
-@njit(cache=True, nogil=True)
-def _between(p: Array, q: Array) -> float:
-    """Distance of the middles of segments (2, 3)."""
-    x, y = p[0, 0] + p[1, 0] - q[0, 0] - q[1, 0], p[0, 1] + p[1, 1] - q[0, 1] - q[1, 1]
-    z = p[0, 2] + p[1, 2] - q[0, 2] - q[1, 2]
-    return 0.5 * math.sqrt(x * x + y * y + z * z)
-
-
-@njit(cache=True, nogil=True)
-def _reach(p: Array) -> float:
-    """Half the length of a segment (2, 3)."""
-    x, y, z = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-    return 0.5 * math.sqrt(x * x + y * y + z * z)

@@ -41,14 +41,19 @@ class Course:
 
     def at(self, t: float) -> tuple[Array, float]:
         """(position (2,) m, heading rad) at time t s, also before 0."""
+        place, heading = self.along(np.array(t))
+        return place, float(heading)
+
+    def along(self, t: Array) -> tuple[Array, Array]:
+        """Positions (..., 2) m and headings (...,) rad at times t (...,) s."""
         turn = self.yaw_rate * t
         # integral of the rotation by yaw_rate: t sinc and its partner, regular at no turn
         half = 0.5 * turn
-        size = t * (math.sin(half) / half if half else 1.0)
+        size = t * np.sinc(half / np.pi)
         way = self.heading + half
-        c, s = math.cos(way), math.sin(way)
+        c, s = np.cos(way), np.sin(way)
         (vx, vy), (x, y) = self.velocity, self.start
-        return np.array([x + size * (c * vx - s * vy), y + size * (s * vx + c * vy)]), self.heading + turn
+        return np.stack([x + size * (c * vx - s * vy), y + size * (s * vx + c * vy)], axis=-1), self.heading + turn
 
 
 @dataclass(frozen=True, eq=False)

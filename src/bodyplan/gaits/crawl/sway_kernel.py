@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray
+from bodyplan.curves.pieces import lean
 from bodyplan.gaits.crawl.leg_kernel import Postures, Tables, chain, moment, placed, room, sides
 from bodyplan.spatial.hulls import EDGE, edge_distance, edges_of
 
@@ -16,7 +17,7 @@ from bodyplan.spatial.hulls import EDGE, edge_distance, edges_of
 LEAST = 1e-6
 
 
-@njit(cache=True, nogil=True)
+@lean
 def turn_of(pose: Array, R: Array) -> None:
     """Rotation ``R`` (3, 3) = Rz(yaw) Ry(pitch) Rx(roll) of a ``pose`` (6,): x, y, z, roll, pitch, yaw."""
     sr, cr, sp, cp, sy, cy = (
@@ -32,7 +33,7 @@ def turn_of(pose: Array, R: Array) -> None:
     R[2, 0], R[2, 1], R[2, 2] = -sp, cp * sr, cp * cr
 
 
-@njit(cache=True, nogil=True)
+@lean
 def seen(R: Array, pose: Array, point: Array, out: Array) -> None:
     """The world ``point`` (3,) in the axes and from the origin of a body at ``pose`` (6,) turned by ``R``."""
     x, y, z = point[0] - pose[0], point[1] - pose[1], point[2] - pose[2]

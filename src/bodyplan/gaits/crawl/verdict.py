@@ -10,10 +10,10 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.errors import Status
 from bodyplan.gaits.crawl.legs import Legs
+from bodyplan.gaits.crawl.poses import base_of, seen_from
 from bodyplan.gaits.crawl.shell import Shell
 from bodyplan.gaits.crawl.steps import Step, blend, swing_path
 from bodyplan.ground.base import Ground
-from bodyplan.spatial.rotations import conjugate, matrix_from_quaternion
 
 #: where a step is looked at for what links and body could touch: of the body's move, and of the swing
 MOVE, SWING = np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 33)
@@ -103,21 +103,3 @@ class Lookout:
         if short > EXACT:
             return Failure(Status.BELOW_FLOOR, "", step.begin, short, True, made=step)
         return None
-
-
-def base_of(poses: Array) -> Array:
-    """Base poses (T, 7) from x, y, z, roll, pitch, yaw (T, 6): R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    out = np.empty((len(poses), 7))
-    out[:, :3] = poses[:, :3]
-    (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * poses[:, 3:].T), np.sin(0.5 * poses[:, 3:].T)
-    out[:, 3] = cy * cp * cr + sy * sp * sr
-    out[:, 4] = cy * cp * sr - sy * sp * cr
-    out[:, 5] = cy * sp * cr + sy * cp * sr
-    out[:, 6] = sy * cp * cr - cy * sp * sr
-    return out
-
-
-def seen_from(base: Array, points: Array) -> Array:
-    """World points (T, m, 3) in the frames of ``base`` (T, 7)."""
-    back = matrix_from_quaternion(conjugate(base[:, 3:]))
-    return np.asarray(np.einsum("tij,tmj->tmi", back, points - base[:, None, :3]))
