@@ -36,6 +36,9 @@ MOVE_TIME = 1.0
 SHORT = 1e-2
 #: share of the pace over level ground at which a way over steps that is found quickly is good enough
 BRISK = 0.65
+#: share at which it is where no wide search finds another; slower ones may be small steps on the spot before what
+#: cannot be passed
+SLOW = 0.5
 #: most cycles of a gait that does not repeat
 MOST_CYCLES = 400
 
@@ -218,7 +221,7 @@ def _over_steps(
 ) -> Sequence:
     """The fastest way over steps that the search finds."""
     walker = Walker(snake, track, demands, gait.lift_of(demands), gait.clearance_of(demands))
-    local = _local(gait, snake, track, least)
+    local = _local(gait, snake, track)
     spacings = gait.spacings(demands) if local is None else local.spacings
     start = walker.stand(snake.tail + np.concatenate([[0.0], np.cumsum(spacings)]))
     still = Moves(start[None], start[None], np.zeros((1, len(start))), np.ones((1, len(start))), ("stands",))
@@ -244,26 +247,26 @@ def _over_steps(
 
 
 def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: float) -> tuple[Way, int]:
-    """The way that a narrow search finds at a good pace, or else a wide one at any; and how many stances were tried.
-    Where neither goes on under a ceiling the snake comes to low places stretched."""
+    """The first way at a good pace that searches find, narrow ones first, or else the farthest; and how many stances
+    were tried. Where a search does not go on under a ceiling the snake comes to low places stretched."""
     walkers = [walker]
     if np.isfinite(walker.track.steps.roof_z).any():
         walkers.append(replace(walker, crouch=float(walker.demands.straight.max())))
-    tried, begin = 0, float(start[:, 0].mean())
+    tried, far = 0, wanted * pace
     ways: list[Way] = []
     for breadth in (*NARROW, WIDE):
-        ways = []
         for each in walkers:
             way = search(each, start, schedule, wanted, pace, breadth)
             tried += way.tried
-            slow = way.far - begin < BRISK * wanted * pace
-            if way.status == Status.OK and not (slow and breadth is not WIDE):
+            share = (way.far - float(start[:, 0].mean())) / far if far > 0.0 else 1.0
+            if way.status == Status.OK and share >= BRISK:
                 return way, tried
-            ways.append(way)
+            if breadth is WIDE or (way.status == Status.OK and share >= SLOW):
+                ways.append(way)
     return max(ways, key=lambda w: (w.status == Status.OK, w.far)), tried
 
 
-def _local(gait: Rectilinear, snake: InchingSnake, track: Track, least: float) -> Stride | None:
+def _local(gait: Rectilinear, snake: InchingSnake, track: Track) -> Stride | None:
     """The fastest gait under the lowest ceiling over the body where it begins."""
     reach = snake.tail + float(snake.links.sum()) + snake.head
     under = [track.ceiling]
@@ -273,5 +276,4 @@ def _local(gait: Rectilinear, snake: InchingSnake, track: Track, least: float) -
     room = min(under) - track.floor - snake.rest - snake.top - gait.clearance_of(snake.demands(np.inf))
     if gait.ceiling is not None:
         room = min(room, gait.ceiling)
-    demands = snake.demands(room, gait.least_margin)
-    return fastest(demands, gait.spacings(demands), gait.schedule, gait.lift_of(demands), least, gait.dwell)
+    return _stride(_standard(gait), snake.robot, room)

@@ -23,6 +23,7 @@ from bodyplan.gaits.rectilinear.swing import PATHS
 from bodyplan.gaits.rectilinear.track import Track
 from bodyplan.ground.base import Ground
 from bodyplan.ground.plane import Plane
+from bodyplan.ground.profile import Profile
 from bodyplan.motion import Motion
 from bodyplan.robot.model import Robot
 from bodyplan.units import to_si
@@ -214,12 +215,25 @@ class Rectilinear(Gait):
         """Time of one cycle on ``ground`` (a level floor where None), s; None where it does not repeat."""
         if self.steer:
             return None
-        sequence = self.sequence(robot, Plane() if ground is None else ground, 0.0)
+        place = Plane() if ground is None else ground
+        if not Track.of(place, self.start, self.heading).level:
+            InchingSnake.of(robot, self.anchors, self.joints)  # or InputError
+            return None
+        sequence = self.sequence(robot, place, 0.0)
         return None if sequence.advance is None or self.cycles is not None else sequence.length
 
     def sequence(self, robot: Robot, ground: Ground, until: float) -> Sequence:
         """The moves in time; those that do not repeat last for ``until`` s where they can."""
-        return _sequence(self, robot, ground, until)
+        return _sequence(self._without_rest(ground), robot, ground, until)
+
+    def _without_rest(self, ground: Ground) -> Rectilinear:
+        """This gait without what its moves do not depend on."""
+        rest: dict[str, Any] = {"share": SHARE} if self.drive == "fastest" else {}
+        if isinstance(ground, Profile):
+            rest["start"] = (self.start[0], 0.0)  # the same at every y
+        options = self.to_dict() | rest
+        del options["kind"]
+        return type(self)(**options)
 
     def plan(self, robot: Robot, ground: Ground, t: Array) -> Motion:
         """The motion at times t (T,) >= 0 s. Raises InputError for a robot without enough pitch joints, and for ground

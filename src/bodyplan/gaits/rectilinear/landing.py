@@ -12,20 +12,8 @@ from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, room_for
 from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Steps, highest, try_move
 
-#: what is known of a spot before it is tried; that the anchor cannot stand there, or that no swing leads there
-UNKNOWN, NO_STANCE, NO_SWING = -3, -1, -2
-
-
-class Offer(NamedTuple):
-    """What swings and landing spots are tried: ``shapes`` (k, 2) of swings; ``places`` (p,) along the way, those first
-    at which something in the way shows early; in how many ``rounds`` ``closer`` more spots are tried beyond the
-    farthest that goes; ``shares`` (m,) of the way to it where others are offered."""
-
-    shapes: Array
-    places: Array
-    closer: int
-    rounds: int
-    shares: Array
+#: what is told of a spot where the anchor cannot stand, or where no swing leads to
+NO_STANCE, NO_SWING = -1, -2
 
 
 class Trial(NamedTuple):
@@ -129,83 +117,11 @@ def swing_to(
 
 @njit(cache=True)
 def land(
-    bounds: Bounds, steps: Steps, keeps: Keeps, here: Array, i: int, spots: Array, offer: Offer, met: float, out: Array,
-    which: IntArray,
+    bounds: Bounds, steps: Steps, keeps: Keeps, here: Array, i: int, spots: Array, shapes: Array, places: Array,
+    met: float, out: Array, which: IntArray,
 ) -> None:  # fmt: skip
-    """:func:`swing_to` for each of ``spots`` (K, 2), into ``which`` (K,) and ``out`` (K, 2)."""
-    trial = trial_of(bounds, here, offer.places)
+    """:func:`swing_to` for each of ``spots`` (K, 2), tried at ``places`` (p,), into ``which`` (K,) and ``out``
+    (K, 2)."""
+    trial = trial_of(bounds, here, places)
     for k in range(len(spots)):
-        which[k], out[k, 0], out[k, 1] = swing_to(bounds, steps, keeps, trial, here, i, spots[k], offer.shapes, met)
-
-
-@njit(cache=True)
-def choose(
-    bounds: Bounds, steps: Steps, keeps: Keeps, here: Array, i: int, at: Array, edges: Array, room: tuple[float, float],
-    far: float, step: float, offer: Offer, met: float,
-) -> Array:  # fmt: skip
-    """Landing spots (k, 4) of anchor ``i``, the farthest first: s and height m, lift m and how early the swing rises.
-
-    Of the places ``at`` (K,) m, ascending, the farthest that goes, or one beyond it that is closer to where nothing
-    goes any more (not ``far`` m or farther, and within ``room``); those at ``edges``; and at shares of the way to it
-    the next ones that go."""
-    most = len(at) + offer.closer * offer.rounds
-    spots, known, made = np.empty((most, 2)), np.full(most, UNKNOWN), np.empty((most, 2))
-    trial = trial_of(bounds, here, offer.places)
-    count = len(at)
-    for k in range(count):
-        spots[k, 0] = at[k]
-    # what does not go beyond the farthest is not tried: from the far end on
-    last = -1
-    for k in range(count - 1, -1, -1):
-        _try(bounds, steps, keeps, trial, here, i, k, spots, known, made, offer, met)
-        if known[k] >= 0:
-            last = k
-            break
-    if last < 0:
-        return np.empty((0, 4))
-    for _ in range(offer.rounds):
-        begin = spots[last, 0]
-        for k in range(offer.closer, 0, -1):
-            x = begin + step * k / (offer.closer + 1)
-            if x >= far or not room[0] <= x <= room[1]:
-                continue
-            spots[last + k, 0], known[last + k] = x, UNKNOWN
-            _try(bounds, steps, keeps, trial, here, i, last + k, spots, known, made, offer, met)
-            if known[last + k] >= 0:
-                for j in range(1, k):
-                    spots[last + j, 0], known[last + j] = begin + step * j / (offer.closer + 1), UNKNOWN
-                last += k
-                break
-        step /= offer.closer + 1
-    chosen = np.zeros(last + 1, dtype=np.bool_)
-    chosen[last] = True
-    for share in offer.shares:
-        for k in range(int(np.round(share * last)), -1, -1):
-            _try(bounds, steps, keeps, trial, here, i, k, spots, known, made, offer, met)
-            if known[k] >= 0:
-                chosen[k] = True
-                break
-    for k in range(last):
-        for edge in edges:
-            if not chosen[k] and abs(edge - spots[k, 0]) < 1e-12:
-                _try(bounds, steps, keeps, trial, here, i, k, spots, known, made, offer, met)
-                chosen[k] = known[k] >= 0
-    out = np.empty((chosen.sum(), 4))
-    row = 0
-    for k in range(last, -1, -1):
-        if chosen[k]:
-            out[row, 0], out[row, 1], out[row, 2], out[row, 3] = spots[k, 0], spots[k, 1], made[k, 0], made[k, 1]
-            row += 1
-    return out
-
-
-@lean
-def _try(
-    bounds: Bounds, steps: Steps, keeps: Keeps, trial: Trial, here: Array, i: int, k: int, spots: Array,
-    known: IntArray, made: Array, offer: Offer, met: float,
-) -> None:  # fmt: skip
-    """Find out whether anchor ``i`` gets to spot ``k``, if that is not known."""
-    if known[k] == UNKNOWN:
-        x = spots[k, 0]
-        spots[k, 1] = highest(steps.floor_x, steps.floor_z, x, x) + keeps.rest
-        known[k], made[k, 0], made[k, 1] = swing_to(bounds, steps, keeps, trial, here, i, spots[k], offer.shapes, met)
+        which[k], out[k, 0], out[k, 1] = swing_to(bounds, steps, keeps, trial, here, i, spots[k], shapes, met)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray
+from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.holding import Holding, holding
-from bodyplan.gaits.rectilinear.moves import State, bends
+from bodyplan.gaits.rectilinear.moves import Moves, State, bends
 from bodyplan.gaits.rectilinear.sequence import Moment, Sequence
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.gaits.rectilinear.track import Track
@@ -52,6 +52,7 @@ def motion_of(gait: Rectilinear, snake: InchingSnake, track: Track, sequence: Se
     standing = _standing(sequence, moment)
     held = holding(snake, poses.array, track.along, track.world(anchors) @ track.along, standing)
     contacts, forces = carrying(snake, standing, held)
+    states = _everywhere(snake, sequence.moves)
     return Motion(
         robot=robot,
         ground=track.ground,
@@ -63,14 +64,20 @@ def motion_of(gait: Rectilinear, snake: InchingSnake, track: Track, sequence: Se
         qdd=qdd,
         residual=residual,
         status=status,
-        claims=tuple(_claims(snake, track, sequence, t)) if _moves(sequence) else (),
+        claims=tuple(_claims(snake, track, sequence, states, t)) if _moves(sequence) else (),
         contacts=contacts,
         forces=forces,
         torques=None if held is None else held.torques,
-        facts=_facts(gait, snake, sequence, held, qd),
+        facts=_facts(gait, snake, sequence, states, held),
         stages=_stages(sequence),
         notes=tuple(_notes(gait, sequence, held, t)),
     )
+
+
+def _everywhere(snake: InchingSnake, moves: Moves) -> State:
+    """The snake at PLACES places along every move (M, PLACES, ...)."""
+    which = np.repeat(np.arange(len(moves))[:, None], PLACES, axis=1)
+    return moves.state(snake.links, which, np.broadcast_to(np.linspace(0.0, 1.0, PLACES), which.shape))
 
 
 def _moves(sequence: Sequence) -> bool:
@@ -106,13 +113,12 @@ def _stages(sequence: Sequence) -> tuple[tuple[str, float, float], ...]:
     )
 
 
-def _claims(snake: InchingSnake, track: Track, sequence: Sequence, t: Array) -> list[Claim]:
+def _claims(snake: InchingSnake, track: Track, sequence: Sequence, states: State, t: Array) -> list[Claim]:
     moves = sequence.moves
     every = sequence.length if sequence.advance is not None and sequence.repeats is None else None
     again = 1 if sequence.repeats is None else sequence.repeats
     names = snake.frames[0::2]
     out = []
-    tau = np.linspace(0.0, 1.0, PLACES)
     for turn in range(again):
         for m, (stage, start, end) in enumerate(_stages(sequence)):
             begin, stop = start + turn * sequence.length, end + turn * sequence.length
@@ -125,7 +131,7 @@ def _claims(snake: InchingSnake, track: Track, sequence: Sequence, t: Array) -> 
                 out.append(Claim("at_rest", f"standing anchors at rest: {stage}", data))
             lifted = [i for i in np.flatnonzero(moves.moving[m]) if moves.lift[m, i] > 0.0]
             if lifted and stop <= t[-1] + 1e-9:
-                at = moves.state(snake.links, np.full(PLACES, m), tau).anchors[..., 1]
+                at = states.anchors[m, ..., 1]
                 ends = np.maximum(moves.before[m, :, 1], moves.after[m, :, 1])
                 height = float(min((at[:, i] - ends[i]).max() for i in lifted))
                 if height > 0.0:
@@ -146,17 +152,14 @@ def _claims(snake: InchingSnake, track: Track, sequence: Sequence, t: Array) -> 
 
 
 def _facts(
-    gait: Rectilinear, snake: InchingSnake, sequence: Sequence, held: Holding | None, qd: Array
+    gait: Rectilinear, snake: InchingSnake, sequence: Sequence, states: State, held: Holding | None
 ) -> dict[str, float]:
     """Numbers of the plan, SI."""
     moves = sequence.moves
     gone = float((moves.after[-1, :, 0] - moves.before[0, :, 0]).mean())
     cycles = 1 if sequence.advance is not None else int(sequence.cycle.max()) + 1
-    tau = np.linspace(0.0, 1.0, PLACES)
-    which = np.repeat(np.arange(len(moves)), PLACES)
-    every = moves.state(snake.links, which, np.tile(tau, len(moves)))
-    low = np.minimum(moves.before[..., 1].min(axis=1), moves.after[..., 1].min(axis=1))[which]
-    high = every.elbows(snake.links)[..., 1].max(axis=1) - low
+    low = np.minimum(moves.before[..., 1].min(axis=1), moves.after[..., 1].min(axis=1))
+    high = states.elbows(snake.links)[..., 1].max(axis=(1, 2)) - low
     out = {
         "advance": gone * (sequence.repeats or 1),
         "advance_per_cycle": gone / cycles,
@@ -165,7 +168,7 @@ def _facts(
         "anchors": float(snake.anchors),
         "peak_elbow_height": float(high.max()),
         "peak_body_height": float(high.max()) + snake.top + snake.rest,
-        "peak_joint_rate": _peak_rate(every, sequence, which),
+        "peak_joint_rate": _peak_rate(states, sequence),
         "lift": float(moves.lift.max(initial=0.0)),
     }
     if sequence.advance is not None:
@@ -180,8 +183,8 @@ def _facts(
     return out
 
 
-def _peak_rate(every: State, sequence: Sequence, which: IntArray) -> float:
-    return float((np.abs(bends(every.first)) / sequence.durations[which][:, None]).max())
+def _peak_rate(states: State, sequence: Sequence) -> float:
+    return float((np.abs(bends(states.first)) / sequence.durations[:, None, None]).max())
 
 
 def _table(snake: InchingSnake, sequence: Sequence) -> dict[str, float]:

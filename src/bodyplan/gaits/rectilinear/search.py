@@ -11,6 +11,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import count, pairwise
 
 import numpy as np
@@ -19,7 +20,8 @@ from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import move_names, phases
 from bodyplan.gaits.rectilinear.moves import Moves
-from bodyplan.gaits.rectilinear.walker import Spot, Walker, Why
+from bodyplan.gaits.rectilinear.offers import Offers
+from bodyplan.gaits.rectilinear.walker import Walker, Why
 
 #: places along a move at which it is tried when its turn comes, and those of the way that is found
 CLOSE, FINAL = 121, 361
@@ -54,8 +56,8 @@ HIGHER = (1.02, 1.05, 1.1, 1.2)
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Anchors (N, 2) before phase ``phase`` of cycle ``cycle``, how they came there (the state before and the move), in
-    how many moves, and how often nothing could move."""
+    """Anchors (N, 2) before phase ``phase`` of cycle ``cycle``, how they came there (the state before and the move,
+    None where they stayed), in how many moves, and how often nothing could move."""
 
     anchors: Array
     phase: int = 0
@@ -65,10 +67,15 @@ class _State:
     before: _State | None = None
     move: Moves | None = None
 
-    @property
+    @cached_property
     def far(self) -> float:
         """m: mean of the anchors."""
         return float(self.anchors[:, 0].mean())
+
+    def then(self, phases: int) -> tuple[int, int]:
+        """Phase and cycle after this one's."""
+        after = (self.phase + 1) % phases
+        return after, self.cycle + (after == 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,25 +100,63 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
     ground.
 
     Best first: the state that has come farthest for its number of moves, which counts little, is tried next. Where it
-    has no way on, those behind it get their turn.
+    has no way on, those behind it get their turn. Of where a move can land the farthest is found at once, what lies
+    behind it only when its turn comes: few of those are ever tried.
     """
     groups, names = phases(len(start), schedule), move_names(len(start), schedule)
     link = float(walker.snake.links.mean())
-    heaps: list[list[tuple[float, int, _State]]] = [[] for _ in groups]
+    heaps: list[list[tuple[float, int, _State, Offers | None]]] = [[] for _ in groups]
     seen: dict[tuple[int, ...], tuple[int, float]] = {}
     counter = count()
-    best = _State(start)
-    heapq.heappush(heaps[0], (0.0, next(counter), best))
+    best, none = _State(start), (most + 1, -np.inf)
+
+    def push(state: _State, offers: Offers | None = None) -> None:
+        gone = (state.far - best_start) / pace
+        heapq.heappush(
+            heaps[state.phase], (WEIGHT * state.made + HELD * state.held - gone, next(counter), state, offers)
+        )
+
+    def pop(phase: int) -> _State:
+        """The most promising state; what is offered next after it is pushed instead."""
+        state, offers = heapq.heappop(heaps[phase])[2:]
+        if offers is not None and walker.nearer(offers):
+            before = state.before
+            assert before is not None
+            push(_moved(before, offers, names[before.phase], len(groups)), offers)
+        return state
+
+    def stance(state: _State) -> tuple[int, ...]:
+        at = np.round(state.anchors[:, 0] / (breadth.alike * link)).astype(int)
+        return state.phase, *at.tolist()
+
+    best_start = best.far
+    push(best)
     expanded, last = 0, 0
     wrong: set[_State] = set()
     while expanded < max(MOST_STATES, A_MOVE * most) and expanded - last < breadth.stuck and any(heaps):
         phase = min((k for k, heap in enumerate(heaps) if heap), key=lambda k: heaps[k][0][0])
         first = heaps[phase][0][0]
         batch: list[_State] = []
+        alike: list[_State] = []
+        taken: dict[_State, tuple[int, float]] = {}
         while heaps[phase] and len(batch) < breadth.batch and heaps[phase][0][0] <= first + NEAR:
-            batch.append(heapq.heappop(heaps[phase])[2])
+            state = pop(phase)
+            made, far = known = seen.get(stance(state), none)
+            if state.made >= made and state.far <= far + STEP * link:
+                alike.append(state)
+                continue
+            seen[stance(state)], taken[state] = (min(made, state.made), max(far, state.far)), known
+            batch.append(state)
         expanded += len(batch)
         batch = _sound(walker, [s for s in batch if not wrong or not wrong.intersection(_line(s))])
+        # those alike get their turn where the one that stood for them does not go
+        left = set(taken).difference(batch)
+        for state in reversed([s for s in taken if s in left]):
+            seen[stance(state)] = taken[state]
+        free = {stance(s) for s in left}
+        for state in alike:
+            if stance(state) in free:
+                push(state)
         if not batch:
             continue
         ahead = max([best, *batch], key=lambda s: (round(s.far / (1e-6 * link)), -s.made))
@@ -124,16 +169,12 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
             if line[-1].made >= most:
                 return _way(line, Status.OK, "", expanded)
             wrong.add(_line(state)[len(line)])
-        batch = [s for s in batch if s.made < most]
-        for state in [s for b in batch for s in _next(walker, b, groups[phase], names[phase], len(groups))]:
-            stance = (state.phase, *np.round(state.anchors[:, 0] / (breadth.alike * link)).astype(int).tolist())
-            made, far = seen.get(stance, (most + 1, -np.inf))
-            if state.made < made or state.far > far + STEP * link:
-                seen[stance] = min(made, state.made), max(far, state.far)
-                gone = (state.far - float(start[:, 0].mean())) / pace
-                heapq.heappush(
-                    heaps[state.phase], (WEIGHT * state.made + HELD * state.held - gone, next(counter), state)
-                )
+        for state in (s for s in batch if s.made < most):
+            offers = walker.offers(state.anchors, groups[phase])
+            stuck = bool((offers.at < 0).all())
+            push(_State(state.anchors, *state.then(len(groups)), state.made, state.held + stuck, state))
+            if not stuck:
+                push(_moved(state, offers, names[phase], len(groups)), offers)
     line = _mended(walker, best)
     best = line[-1]
     why: Why = Counter()
@@ -190,20 +231,10 @@ def _sound(walker: Walker, states: list[_State]) -> list[_State]:
     return [s for s in states if s.move is None or next(found)]
 
 
-def _next(walker: Walker, state: _State, group: IntArray, name: str, phases: int) -> list[_State]:
-    """Every state after the anchors of ``group`` have moved, or stayed."""
-    options: list[list[Spot]] = [walker.options(state.anchors, int(i)) for i in group]
-    then = (state.phase + 1) % phases
-    after_that = then, state.cycle + (then == 0)
-    stuck = int(not any(options))
-    out = [_State(state.anchors, *after_that, state.made, state.held + stuck, state, None)]
-    for choice in range(max(len(spots) for spots in options)):
-        after, count = state.anchors.copy(), len(state.anchors)
-        lift, early = np.zeros(count), np.ones(count)
-        for i, spots in zip(group, options, strict=True):
-            if spots:
-                after[i], lift[i], early[i] = spots[min(choice, len(spots) - 1)]
-        move = Moves(state.anchors[None], after[None], lift[None], early[None], (name,))
-        if move.moving.any():
-            out.append(_State(after, *after_that, state.made + 1, state.held, state, move))
-    return out
+def _moved(state: _State, offers: Offers, name: str, phases: int) -> _State:
+    """The state after the anchors have moved to what is offered."""
+    after, lift, early = state.anchors.copy(), np.zeros((1, len(state.anchors))), np.ones((1, len(state.anchors)))
+    after[offers.group] = offers.offered[:, :2]
+    lift[0, offers.group], early[0, offers.group] = offers.offered[:, 2], offers.offered[:, 3]
+    move = Moves(state.anchors[None], after[None], lift, early, (name,))
+    return _State(after, *state.then(phases), state.made + 1, state.held, state, move)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -58,6 +58,10 @@ class InchingSnake:
     def of(cls, robot: Robot, anchors: int, joints: Sequence[str] | None) -> InchingSnake:
         """The snake in ``robot``: its pitch joints named by ``joints``, or 2 N - 1 of them spread evenly from the first
         to the last. InputError where there are too few, or for a robot that is no straight snake."""
+        return _snake(robot, anchors, None if joints is None else tuple(joints))
+
+    @classmethod
+    def _of(cls, robot: Robot, anchors: int, joints: tuple[str, ...] | None) -> InchingSnake:
         made = mechanism(robot)
         if made.kind != "straight":
             raise InputError(f"Rectilinear: needs rigid links; {robot.name!r} bends by {made.kind} joints.")
@@ -176,6 +180,12 @@ class InchingSnake:
         out = np.zeros((*bends.shape[:-1], self.robot.n))
         out[..., self.columns] = bends / self.gain
         return out
+
+
+@lru_cache(maxsize=16)
+def _snake(robot: Robot, anchors: int, joints: tuple[str, ...] | None) -> InchingSnake:
+    """One for all plans with a robot, and so the parts and masses that it finds."""
+    return InchingSnake._of(robot, anchors, joints)
 
 
 def _at(robot: Robot, frame: str) -> tuple[int, ...]:

@@ -10,11 +10,13 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
+from bodyplan.gaits.rectilinear.bounds import Bounds
 from bodyplan.gaits.rectilinear.demands import MET, Demands
-from bodyplan.gaits.rectilinear.landing import Offer, choose, land
+from bodyplan.gaits.rectilinear.landing import land
 from bodyplan.gaits.rectilinear.moves import Moves
+from bodyplan.gaits.rectilinear.offers import Choice, Offers, Ranges, farthest, nearer, places
 from bodyplan.gaits.rectilinear.snake import InchingSnake
-from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, try_moves
+from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Steps, try_moves
 from bodyplan.gaits.rectilinear.track import Track
 
 #: landing spots tried between standing and reach, and rounds that close in on the farthest good one with a few more
@@ -121,8 +123,8 @@ class Walker:
     def _land(self, here: Array, i: int, spots: Array) -> tuple[IntArray, Array]:
         which, made = np.empty(len(spots), dtype=np.int64), np.zeros((len(spots), 2))
         land(
-            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _OFFER, MET, made,
-            which,
+            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _CHOICE.shapes,
+            _CHOICE.places, MET, made, which,
         )  # fmt: skip
         return which, made
 
@@ -137,7 +139,7 @@ class Walker:
     def why(self, here: Array, i: int, name: str) -> Why:
         """What is against the landing spots of anchor ``i`` of ``here`` (N, 2)."""
         out: Why = Counter()
-        spots = self.stand(self._spots(here, i))
+        spots = self.stand(places(self.ranges, SPOTS, np.ascontiguousarray(here), i))
         if not len(spots):
             out[name, Status.OUT_OF_REACH] += 1
             return out
@@ -153,47 +155,28 @@ class Walker:
             out.update((name, status) for status in (self._plainest(here, i, left) if len(left) else []))
         return out
 
-    def options(self, here: Array, i: int) -> list[Spot]:
-        """Where anchor ``i`` of ``here`` (N, 2) may land, with the lift and shape of its swing, the farthest first."""
-        at = np.sort(self._spots(here, i))
-        if not len(at):
-            return []
-        far, low, high = self._reach(here, i), *self._room(here, i)
-        roomy = (at >= low) & (at <= high)
-        found = np.zeros((0, 4))
-        for places in (at[roomy], at[~roomy]):
-            if len(places) and not len(found):
-                found = choose(
-                    self.demands.bounds, self.track.steps, self.keeps, here, i, places, self._beside_edges[i],
-                    (low, high), far, (far - here[i, 0]) / SPOTS, _OFFER, MET,
-                )  # fmt: skip
-        return [(spot[:2], float(spot[2]), float(spot[3])) for spot in found]
+    def offers(self, here: Array, group: IntArray) -> Offers:
+        """The farthest landing spots of the anchors ``group`` (G,) of ``here`` (N, 2), with lift and shape of swings,
+        those first that make no leg too short for the next move."""
+        found: Offers = farthest(*self._known, _CHOICE, MET, np.ascontiguousarray(here), group)
+        return found
 
-    def _spots(self, here: Array, i: int) -> Array:
-        """Places (K,) m where anchor ``i`` might land."""
-        at, far = here[i, 0], self._reach(here, i)
-        edges = self._beside_edges[i]
-        even = at + (far - at) * np.arange(1, SPOTS + 1) / SPOTS if far > at else np.zeros(0)
-        return np.concatenate([even, edges[(edges > at) & (edges < far)]])
+    def nearer(self, offers: Offers) -> bool:
+        """Offer what lies next behind; False where nothing does."""
+        return bool(nearer(*self._known, _CHOICE, MET, offers))
 
-    def _room(self, here: Array, i: int) -> tuple[float, float]:
-        """m from where and up to where anchor ``i`` makes no leg of ``here`` too short for the next move."""
-        low, high = -np.inf, np.inf
-        if self.short is not None:
-            if i > 0:
-                low = here[i - 1, 0] + self.short[i - 1] * (1.0 - 1e-9)
-            if i < len(here) - 1:
-                high = here[i + 1, 0] - self.short[i] * (1.0 - 1e-9)
-        return float(low), float(high)
+    @cached_property
+    def _known(self) -> tuple[Bounds, Steps, Keeps, Ranges]:
+        return self.demands.bounds, self.track.steps, self.keeps, self.ranges
 
-    def _reach(self, here: Array, i: int) -> float:
-        """m: what anchor ``i`` cannot pass: the reach of the leg behind it, and the anchor ahead."""
-        far = np.inf
-        if i > 0:
-            far = min(far, here[i - 1, 0] + self.demands.straight[i - 1])
-        if i < len(here) - 1:
-            far = min(far, here[i + 1, 0] - self.demands.nearest)
-        return float(max(far, here[i, 0]))
+    @cached_property
+    def ranges(self) -> Ranges:
+        """Where anchors may land, for kernels."""
+        edges = self._beside_edges
+        first = np.concatenate([[0], np.cumsum([len(some) for some in edges])]).astype(np.int64)
+        straight = np.array(self.demands.straight)
+        short = np.full(len(straight), -np.inf) if self.short is None else np.array(self.short)
+        return Ranges(straight, float(self.demands.nearest), short, np.concatenate(edges), first)
 
     @cached_property
     def _beside_edges(self) -> list[Array]:
@@ -220,4 +203,4 @@ def _halved(count: int) -> Array:
     return np.linspace(0.0, 1.0, count)[np.argsort(turned, kind="stable")]
 
 
-_OFFER = Offer(np.array(SHAPES), _halved(PLACES), CLOSER, ROUNDS, np.array(SHARES))
+_CHOICE = Choice(SPOTS, CLOSER, ROUNDS, np.array(SHARES), np.array(SHAPES), _halved(PLACES))
