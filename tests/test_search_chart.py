@@ -1,6 +1,7 @@
 """The example that searches many corridors, with few trials: it goes on, adds corridors, and draws its chart."""
 
 import csv
+import json
 import runpy
 import sys
 from pathlib import Path
@@ -36,8 +37,8 @@ def test_corridors_are_searched_once_and_added(tmp_path, script, monkeypatch, ca
     sets = ["--mission", str(mission), "--set", "gait.contraction=travelling", "--out", str(tmp_path / "out")]
     with cluster_of_processes(tmp_path, 1) as (address, _):
 
-        def run(*widths):
-            argv = [str(EXAMPLE), "--widths", *widths, *SETTINGS, *sets, "--scheduler", address]
+        def run(*widths, more=()):
+            argv = [str(EXAMPLE), "--widths", *widths, *SETTINGS, *sets, "--scheduler", address, *more]
             monkeypatch.setattr(sys, "argv", argv)
             script["main"]()
             capsys.readouterr()
@@ -47,8 +48,14 @@ def test_corridors_are_searched_once_and_added(tmp_path, script, monkeypatch, ca
         assert len(points) == 2 and all(content.count(b"\n") > 1 for content in points.values())
         assert run("150") == points
         more = run("20", "150")
+        run("150", more=["--frictions", "0.9"])
     assert more == points
-    narrow, found = rows_of(tmp_path / "out" / "corridors.csv")
+    slippery, narrow, found = rows_of(tmp_path / "out" / "corridors.csv")
+    # the gait of the other friction is tried in this one
+    gait = [word for word in found["sets"].split() if word.startswith("gait.")]
+    executed = json.loads((tmp_path / "out" / "width-150-friction-0.9" / "executed.json").read_text())
+    (figures,) = [figures for key, figures in executed.items() if key.endswith("friction=0.9 " + " ".join(gait))]
+    assert slippery["friction"] == "0.9" and figures["planned_mm_s"] == pytest.approx(float(found["planned_mm_s"]))
     assert "fits" in narrow["note"] and (float(narrow["width_mm"]), float(found["width_mm"])) == (20.0, 150.0)
     assert int(found["trials"]) == 10 and (found["note"] or float(found["advance_ratio"]) >= 0.95)
 
