@@ -94,6 +94,14 @@ def tape_bounds(tape: Tape, low_x: float, low_y: float, high_x: float, high_y: f
 
 
 @_lean
+def tape_slopes(tape: Tape, room: Array) -> tuple[float, float, float, float]:
+    """Lowest and highest slope along x, then along y, over the box of the last :func:`tape_bounds` in ``room``."""
+    low_x, high_x = _wider(room, tape.outputs[1])
+    low_y, high_y = _wider(room, tape.outputs[2])
+    return low_x, high_x, low_y, high_y
+
+
+@_lean
 def tape_range(
     tape: Tape, low_x: float, low_y: float, high_x: float, high_y: float, room: Array
 ) -> tuple[float, float]:

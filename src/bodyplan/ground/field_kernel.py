@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -65,6 +65,23 @@ class FieldArrays(NamedTuple):
     bounds: Tape
     span: Tape
     creases: Creases
+
+
+class Asking(Protocol):
+    """What a kernel's room must have to ask a field: the spline's ``basis`` (2, 3, 4), ``bounds`` (BOUNDS,) and
+    registers of programs."""
+
+    @property
+    def basis(self) -> Array: ...
+
+    @property
+    def bounds(self) -> Array: ...
+
+    @property
+    def jet_registers(self) -> Array: ...
+
+    @property
+    def bounds_registers(self) -> Array: ...
 
 
 class Room(NamedTuple):
@@ -137,7 +154,7 @@ def _joined(tapes: Sequence[Tape]) -> Creases:
 
 
 @lean
-def jet_at(field: FieldArrays, x: float, y: float, room: Room, out: Array) -> None:
+def jet_at(field: FieldArrays, x: float, y: float, room: Asking, out: Array) -> None:
     """Value and derivatives at a place into ``out`` (JET,); value nan where the ground is undefined."""
     if field.formula:
         tape_jet(field.jet, x, y, room.jet_registers, out)
@@ -148,7 +165,7 @@ def jet_at(field: FieldArrays, x: float, y: float, room: Room, out: Array) -> No
 
 
 @lean
-def bounds_at(field: FieldArrays, low_x: float, low_y: float, high_x: float, high_y: float, room: Room) -> None:
+def bounds_at(field: FieldArrays, low_x: float, low_y: float, high_x: float, high_y: float, room: Asking) -> None:
     """Bounds over a box into ``room.bounds``."""
     out = room.bounds
     if field.formula:

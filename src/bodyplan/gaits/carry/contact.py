@@ -10,7 +10,7 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry import newton, search, steps
 from bodyplan.gaits.carry.planes import Planes, Section, section
 from bodyplan.gaits.carry.terrain import Steps, Terrain
-from bodyplan.ground.heightmap import HeightMap
+from bodyplan.ground.field import Field
 from bodyplan.threads import shared
 
 #: outcomes, as in :mod:`bodyplan.gaits.carry.contact_kernel`
@@ -65,7 +65,7 @@ def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contact
             parts[k] = _find(ground, planes.take(index), None if start is None else start[index])
         return 0
 
-    shared(part, len(planes), threaded_from=THREADED if isinstance(ground, HeightMap) else 2 * CHUNK)
+    shared(part, len(planes), threaded_from=THREADED if isinstance(ground, Field) else 2 * CHUNK)
     found = [parts[k] for k in sorted(parts)]
     return Contacts(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Contacts)))
 
@@ -73,7 +73,7 @@ def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contact
 def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
     if isinstance(ground, Steps):
         return _on_steps(ground, planes)
-    if isinstance(ground, HeightMap):
+    if isinstance(ground, Field):
         return _in_kernels(ground, planes, start)
     return _at_once(ground, planes, start)
 
@@ -121,12 +121,13 @@ def _on_steps(ground: Steps, planes: Planes) -> Contacts:
     return Contacts(phi, radius, point, normal, curvature, residual, second, found.edge, none, outcome)
 
 
-def _in_kernels(ground: HeightMap, planes: Planes, start: Array | None) -> Contacts:
-    """The same on a height map, wheel by wheel."""
+def _in_kernels(ground: Field, planes: Planes, start: Array | None) -> Contacts:
+    """The same on a height map or a formula, wheel by wheel."""
     from bodyplan.gaits.carry import contact_kernel
-    from bodyplan.gaits.carry.section_kernel import COLUMNS, Land, Room
+    from bodyplan.gaits.carry.section_kernel import COLUMNS, Room
 
-    count, land, room = len(planes), Land.of(ground), Room.of(search.MOST_CELLS)
+    count, land = len(planes), ground.field_arrays
+    room = Room.of(land, search.MOST_CELLS)
     rows, limits = planes.rows, search.limits()
     first = np.full(count, np.nan) if start is None else np.ascontiguousarray(start, dtype=np.float64)
     feet, chi, radius = np.empty((count, COLUMNS)), np.empty(count), np.empty(count)

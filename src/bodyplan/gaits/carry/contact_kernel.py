@@ -1,5 +1,5 @@
-"""The kernels of :mod:`bodyplan.gaits.carry.contact` for height maps: a contact found, proved and measured, wheel by
-wheel.
+"""The kernels of :mod:`bodyplan.gaits.carry.contact` for height maps and formulas: a contact found, proved and
+measured, wheel by wheel.
 
 The columns of ``planes`` (n, 9) are centre, ahead and up, those of ``feet`` (n, COLUMNS) the sections at s = 0.
 """
@@ -14,22 +14,8 @@ from numba import njit
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry.newton import BEST_CHI, BEST_RADIUS, CHI, GOES_ON, MERIT, MOST_STEPS, RADIUS, SETTLED, tried
 from bodyplan.gaits.carry.search_kernel import bent, nearest_on
-from bodyplan.gaits.carry.section_kernel import (
-    FIRST,
-    FOUND,
-    GX,
-    GY,
-    HXX,
-    HXY,
-    HYY,
-    Land,
-    Room,
-    W,
-    farthest,
-    foot_at,
-    jet_at,
-    lean,
-)  # fmt: skip
+from bodyplan.gaits.carry.section_kernel import FIRST, FOUND, Room, W, farthest, foot_at
+from bodyplan.ground.field_kernel import GX, GY, HXX, HXY, HYY, FieldArrays, jet_at, lean
 
 #: outcomes
 TOUCHES, LIES_FLAT, NO_GROUND, AXLE_BELOW, UNPROVED, OFF_THE_MAP = range(6)
@@ -50,7 +36,7 @@ def _guess(foot: Array, tilt: float, start: float) -> tuple[float, float]:
 
 
 @lean
-def _settled(land: Land, plane: Array, chi: float, radius: float, room: Room, state: Array) -> bool:
+def _settled(land: FieldArrays, plane: Array, chi: float, radius: float, room: Room, state: Array) -> bool:
     """Newton's method of :mod:`bodyplan.gaits.carry.newton` for one wheel, into ``state`` (8,)."""
     for k in range(len(state)):
         state[k] = 0.0
@@ -68,7 +54,7 @@ def _settled(land: Land, plane: Array, chi: float, radius: float, room: Room, st
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def settle(
-    land: Land,
+    land: FieldArrays,
     planes: Array,
     tilt: Array,
     flat: BoolArray,
@@ -101,7 +87,7 @@ def settle(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def prove(
-    land: Land,
+    land: FieldArrays,
     planes: Array,
     tilt: Array,
     feet: Array,
@@ -152,7 +138,7 @@ def prove(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def measure(
-    land: Land,
+    land: FieldArrays,
     planes: Array,
     tilt: Array,
     chi: Array,
@@ -196,7 +182,7 @@ def measure(
             size = math.sqrt(at[GX] ** 2 + at[GY] ** 2 + 1.0)
             normal[k, 0], normal[k, 1], normal[k, 2] = -at[GX] / size, -at[GY] / size, 1.0 / size
         if outcome[k] == TOUCHES:
-            if not (land.box[0] <= x <= land.box[2] and land.box[1] <= y <= land.box[3]):
+            if not (land.box[0, 0] <= x <= land.box[1, 0] and land.box[0, 1] <= y <= land.box[1, 1]):
                 outcome[k] = OFF_THE_MAP
             elif not residual[k] <= tolerance * (1.0 + farthest(plane)):
                 outcome[k] = UNPROVED

@@ -1,4 +1,4 @@
-"""The kernels of :mod:`bodyplan.gaits.carry.search` for height maps: the same proof, wheel by wheel.
+"""The kernels of :mod:`bodyplan.gaits.carry.search` for height maps and formulas: the same proof, wheel by wheel.
 
 Planes, the ground and sections are those of :mod:`bodyplan.gaits.carry.section_kernel`.
 """
@@ -15,30 +15,20 @@ from bodyplan.gaits.carry.section_kernel import (
     CUTS,
     FIRST,
     FOUND,
-    GX,
-    GY,
-    HXX,
     NOTES,
     SECOND,
     STEEP,
-    THIRD,
-    XX,
-    XY,
-    YY,
-    Z_HIGH,
-    Z_LOW,
-    Land,
     Room,
     W,
     bounds_at,
     farthest,
     foot_at,
     highest_at,
-    jet_at,
-    lean,
     section_at,
+    steepest_at,
     upright,
 )  # fmt: skip
+from bodyplan.ground.field_kernel import GX, GY, HXX, THIRD, XX, XY, YY, Z_HIGH, Z_LOW, FieldArrays, jet_at, lean
 
 #: half the width of the first cell about a contact, as a share of its distance; the least one of those beside it, how
 #: much wider the next ones are, and the widest
@@ -52,7 +42,7 @@ _CLOSE = 1e-13
 
 
 @lean
-def _beyond(land: Land, plane: Array, middle: float, half: float, reach: float) -> bool:
+def _beyond(land: FieldArrays, plane: Array, middle: float, half: float, reach: float, room: Room) -> bool:
     """Whether the height of the ground alone says that the cell ``middle`` +- ``half`` is farther than ``reach``; for
     that only points with abs(w) <= reach count. It says nothing beyond the edge."""
     aside = max(abs(middle) - half, 0.0)
@@ -60,12 +50,14 @@ def _beyond(land: Land, plane: Array, middle: float, half: float, reach: float) 
     size_x = abs(plane[3]) * half + abs(plane[6]) * reach
     size_y = abs(plane[4]) * half + abs(plane[7]) * reach
     # the plane's own height is that of w up: ahead is level
-    below = (plane[2] - highest_at(land, x, y, size_x, size_y)) / plane[8]
+    below = (plane[2] - highest_at(land, x, y, size_x, size_y, room)) / plane[8]
     return aside > reach or (below > 0.0 and aside * aside + below * below > reach * reach)
 
 
 @lean
-def bent(land: Land, plane: Array, at: Array, middle: float, half: float, room: Room) -> tuple[float, float, float]:
+def bent(
+    land: FieldArrays, plane: Array, at: Array, middle: float, half: float, room: Room
+) -> tuple[float, float, float]:
     """Bounds of W'' over the cell ``middle`` +- ``half``, and how far W may be from its middle there: infinite where
     nothing is known. ``at`` is the section in the middle. The steps are those of ``_known`` in
     :mod:`bodyplan.gaits.carry.search`; ``room.bounds`` are those of the cell."""
@@ -116,7 +108,7 @@ def bent(land: Land, plane: Array, at: Array, middle: float, half: float, room: 
 
 
 @lean
-def _judged(land: Land, plane: Array, at: Array, middle: float, half: float, room: Room) -> tuple[float, float]:
+def _judged(land: FieldArrays, plane: Array, at: Array, middle: float, half: float, room: Room) -> tuple[float, float]:
     """A lower bound of D over the cell ``middle`` +- ``half``, and one of Phi'' there, 0 where Phi is not known to be
     convex; ``at`` is the section in the middle. The steps are those of ``judge`` in
     :mod:`bodyplan.gaits.carry.search`."""
@@ -145,21 +137,23 @@ def _judged(land: Land, plane: Array, at: Array, middle: float, half: float, roo
 
 @lean
 def _minimum(
-    land: Land, plane: Array, a: float, b: float, guess: float, close: float, room: Room, at: Array
-) -> tuple[float, bool]:
-    """The one minimum of Phi between a and b, and whether there is one inside: Newton on Phi', kept by bisection;
-    ``at`` is the section there."""
+    land: FieldArrays, plane: Array, a: float, b: float, guess: float, close: float, room: Room, at: Array
+) -> tuple[float, bool, bool]:
+    """The one minimum of Phi between a and b, whether there is one inside, and whether that is known: Newton on Phi',
+    kept by bisection; ``at`` is the section there. It is not known where the section has not been found on the way."""
     section_at(land, plane, a, guess, close, room, at)
     slope = a + at[W] * at[FIRST]
-    if slope >= 0.0:
-        return a, slope == 0.0
+    if at[FOUND] == 0.0 or slope >= 0.0:
+        return a, slope == 0.0, at[FOUND] != 0.0
     section_at(land, plane, b, guess, close, room, at)
     slope = b + at[W] * at[FIRST]
-    if slope <= 0.0:
-        return b, slope == 0.0
+    if at[FOUND] == 0.0 or slope <= 0.0:
+        return b, slope == 0.0, at[FOUND] != 0.0
     s = 0.5 * (a + b)
     for _ in range(60):
         section_at(land, plane, s, guess, close, room, at)
+        if at[FOUND] == 0.0:
+            return s, False, False
         slope, bend = s + at[W] * at[FIRST], 1.0 + at[FIRST] ** 2 + at[W] * at[SECOND]
         if slope < 0.0:
             a = s
@@ -173,11 +167,11 @@ def _minimum(
         if not moved > 1e-10 * math.hypot(s, at[W]):
             break
     foot_at(land, plane, s, room, at)
-    return s, True
+    return s, True, at[FOUND] != 0.0
 
 
 @lean
-def one_curve(land: Land, plane: Array, half: float, room: Room) -> bool:
+def one_curve(land: FieldArrays, plane: Array, half: float, room: Room) -> bool:
     """Whether the ground cuts the plane in one curve within +- ``half`` of its centre; see
     :func:`bodyplan.gaits.carry.search.one_curve`."""
     if upright(plane):
@@ -196,7 +190,8 @@ def one_curve(land: Land, plane: Array, half: float, room: Room) -> bool:
             return False
         straight = max(abs(bounds[XX]), abs(bounds[XX + 1]), abs(bounds[YY]), abs(bounds[YY + 1]))
         norm = straight + max(abs(bounds[XY]), abs(bounds[XY + 1]))
-        if across + slant * norm * math.sqrt(2.0) * size < up:
+        most = across + slant * norm * math.sqrt(2.0) * size
+        if most < up or steepest_at(land, plane[6], plane[7], room) < up:
             continue
         if depth >= CUTS - 1:
             return False
@@ -210,7 +205,7 @@ def one_curve(land: Land, plane: Array, half: float, room: Room) -> bool:
 
 @lean
 def nearest_on(
-    land: Land, plane: Array, foot: Array, guess: float, limits: Array, room: Room
+    land: FieldArrays, plane: Array, foot: Array, guess: float, limits: Array, room: Room
 ) -> tuple[float, float, float, float, bool]:
     """(s, W there, distance, s of another contact as near or nan, certified) of one plane: branch and bound from s = 0,
     where the section is ``foot``, and from ``guess``. ``limits``: relative errors of distances that are proved and that
@@ -264,7 +259,7 @@ def nearest_on(
         for i in range(count):
             a, b, w = cells[i, 0], cells[i, 1], cells[i, 2]
             middle, half = 0.5 * (a + b), 0.5 * (b - a)
-            if _beyond(land, plane, middle, half, nearest * (1.0 + twice)):
+            if _beyond(land, plane, middle, half, nearest * (1.0 + twice), room):
                 continue
             section_at(land, plane, middle, w, close, room, middle_at)
             if middle_at[FOUND] == 0.0 and w != 0.0:
@@ -275,9 +270,10 @@ def nearest_on(
             least, mu = _judged(land, plane, middle_at, middle, half, room)
             if not least < nearest * (1.0 + twice):
                 continue
-            s, found = middle, False
+            s, found, known = middle, False, False
             if mu > 0.0:
-                s, found = _minimum(land, plane, a, b, w, close, room, at)
+                s, found, known = _minimum(land, plane, a, b, w, close, room, at)
+            if known:
                 w, distance = at[W], math.hypot(s, at[W])
             elif least < nearest * (1.0 - proved):
                 # a cell this small holds an edge of the ground, and its middle is it
@@ -290,7 +286,7 @@ def nearest_on(
                     following[left + 1, 0], following[left + 1, 1], following[left + 1, 2] = middle, b, w
                     left += 2
                     continue
-                found = True
+                s, found = middle, True
             if found and distance <= nearest * (1.0 + twice):
                 if distance < nearest:
                     place, depth, nearest = s, w, distance

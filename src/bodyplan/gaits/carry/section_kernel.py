@@ -1,6 +1,6 @@
-"""What kernels of wheels ask of a height map: its height, bounds and sections by the planes of wheels.
+"""What kernels of wheels ask of a height map or a formula: its height, bounds and sections by the planes of wheels.
 
-A ``plane`` (9,) is that of a wheel: its centre, ahead and up. ``land`` is a :class:`Land`, which kernels ask with
+A ``plane`` (9,) is that of a wheel: its centre, ahead and up. ``land`` is the ground, which kernels ask with
 :func:`jet_at`, :func:`bounds_at` and :func:`highest_at` only. What is known of a section is a row of numbers; their
 names are columns.
 """
@@ -8,22 +8,17 @@ names are columns.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from bodyplan.arrays import Array, IntArray
-from bodyplan.ground.heightmap import HeightMap
-from bodyplan.ground.spline_kernel import spline_at, spline_bounds
+from bodyplan.arrays import Array
+from bodyplan.expressions.tape_kernel import tape_range, tape_slopes
+from bodyplan.ground import field_kernel
+from bodyplan.ground.field_kernel import BOUNDS, GX, GY, HXX, HXY, HYY, JET, Z_HIGH, F, FieldArrays, jet_at, lean
 
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
-
-#: columns of a section (:class:`bodyplan.gaits.carry.planes.Section`): first those of the ground's jet
-F, GX, GY, HXX, HXY, HYY, W, FIRST, SECOND, STEEP, FOUND, COLUMNS = range(12)
-#: columns of bounds: lowest and highest of the height, of the second derivatives, and a bound of the third ones
-Z_LOW, Z_HIGH, XX, XY, YY, THIRD, BOUNDS = 0, 1, 2, 4, 6, 8, 9
+#: columns of a section (:class:`bodyplan.gaits.carry.planes.Section`), after those of the ground's jet
+W, FIRST, SECOND, STEEP, FOUND, COLUMNS = range(JET, JET + 6)
 #: notes of minima kept for one wheel
 NOTES = 64
 #: how often a box of the ground is cut into four at most, and boxes that wait for it
@@ -33,42 +28,15 @@ _WAITING = 3 * CUTS + 4
 _FIRST = 64
 
 
-def lean(kernel: Kernel) -> Kernel:
-    """``njit`` for kernels that make no arrays: they do without Numba's counts of references, which take longer than
-    the arithmetic of a short kernel. Assigning an array to a slice makes one."""
-    compiled: Any = njit
-    return cast(Kernel, compiled(cache=True, nogil=True, error_model="numpy", _nrt=False)(kernel))
-
-
-class Land(NamedTuple):
-    """A height map: ``box`` (4,) lowest x, y and highest x, y of it; the Hermite data ``nodes`` of its spline, the
-    ``offsets``, ``widths`` and ``tables`` of its bounds, and ``place`` (5,): sides of a cell dx, dy, x and y of the
-    first sample, and the level that heights count from."""
-
-    box: Array
-    nodes: Array
-    offsets: IntArray
-    widths: IntArray
-    tables: Array
-    place: Array
-
-    @staticmethod
-    def of(ground: HeightMap) -> Land:
-        """The tables of a height map."""
-        spline = ground.spline
-        return Land(
-            np.ascontiguousarray(ground.field_box, dtype=np.float64).ravel(),
-            np.ascontiguousarray(spline.nodes),
-            *spline.pyramid,
-            np.array([*spline.step, *ground.origin, spline.level], dtype=np.float64),
-        )
-
-
 class Room(NamedTuple):
-    """Where kernels work: the spline's ``basis``; sections ``here`` and ``middle``; ``bounds``; ``cells`` (2, n, 3) of
-    two levels of the search: ends and W in the middle; minima ``noted``: s and distance; ``waiting`` boxes."""
+    """Where kernels work: the spline's ``basis``; registers of a formula's programs; sections ``here`` and ``middle``;
+    ``bounds``; ``cells`` (2, n, 3) of two levels of the search: ends and W in the middle; minima ``noted``: s and
+    distance; ``waiting`` boxes."""
 
     basis: Array
+    jet_registers: Array
+    bounds_registers: Array
+    span_registers: Array
     here: Array
     middle: Array
     bounds: Array
@@ -77,10 +45,13 @@ class Room(NamedTuple):
     waiting: Array
 
     @staticmethod
-    def of(cells: int) -> Room:
+    def of(land: FieldArrays, cells: int) -> Room:
         """For up to so many cells a level."""
         return Room(
             np.empty((2, 3, 4)),
+            land.jet.registers.copy(),
+            land.bounds.registers.copy(),
+            land.span.registers.copy(),
             np.empty(COLUMNS),
             np.empty(COLUMNS),
             np.empty(BOUNDS),
@@ -91,36 +62,33 @@ class Room(NamedTuple):
 
 
 @lean
-def jet_at(land: Land, x: float, y: float, room: Room, out: Array) -> None:
-    """Height and derivatives at a place, into ``out`` (6+,)."""
-    place = land.place
-    spline_at(land.nodes, place[0], place[1], x - place[2], y - place[3], room.basis, out)
-    out[F] += place[4]
+def bounds_at(land: FieldArrays, x: float, y: float, size_x: float, size_y: float, room: Room) -> None:
+    """Bounds over the box (x, y) +- size, into ``room.bounds``."""
+    field_kernel.bounds_at(land, x - size_x, y - size_y, x + size_x, y + size_y, room)
 
 
 @lean
-def bounds_at(land: Land, x: float, y: float, size_x: float, size_y: float, room: Room) -> bool:
-    """Bounds over the box (x, y) +- size, into ``room.bounds``; False where the box goes beyond the ground's edge."""
-    place, box, out = land.place, land.box, room.bounds
-    low_x, low_y, high_x, high_y = x - size_x, y - size_y, x + size_x, y + size_y
-    spline_bounds(
-        land.nodes.shape[:2], place[0], place[1], land.offsets, land.widths, land.tables,
-        low_x - place[2], low_y - place[3], high_x - place[2], high_y - place[3], out,
-    )  # fmt: skip
-    out[Z_LOW] += place[4]
-    out[Z_HIGH] += place[4]
-    return bool(low_x >= box[0] and low_y >= box[1] and high_x <= box[2] and high_y <= box[3])
+def steepest_at(land: FieldArrays, way_x: float, way_y: float, room: Room) -> float:
+    """A bound of the slope times a way over the box of the last :func:`bounds_at`, besides that of second derivatives:
+    a formula knows one, inf elsewhere."""
+    if not land.formula:
+        return np.inf
+    low_x, high_x, low_y, high_y = tape_slopes(land.bounds, room.bounds_registers)
+    return max(low_x * way_x, high_x * way_x) + max(low_y * way_y, high_y * way_y)
 
 
 @lean
-def highest_at(land: Land, x: float, y: float, size_x: float, size_y: float) -> float:
+def highest_at(land: FieldArrays, x: float, y: float, size_x: float, size_y: float, room: Room) -> float:
     """A bound of the height over the box (x, y) +- size, inf where the box goes beyond the ground's edge: that of
     :func:`bounds_at` alone."""
-    place, box = land.place, land.box
+    box = land.box
     low_x, low_y, high_x, high_y = x - size_x, y - size_y, x + size_x, y + size_y
-    if not (low_x >= box[0] and low_y >= box[1] and high_x <= box[2] and high_y <= box[3]):
+    if not (low_x >= box[0, 0] and low_y >= box[0, 1] and high_x <= box[1, 0] and high_y <= box[1, 1]):
         return np.inf
-    last_x, last_y = land.nodes.shape[1] - 2, land.nodes.shape[0] - 2
+    if land.formula:
+        return tape_range(land.span, low_x, low_y, high_x, high_y, room.span_registers)[1]
+    spline, place = land.spline, land.spline.place
+    last_x, last_y = spline.nodes.shape[1] - 2, spline.nodes.shape[0] - 2
     # within the box these are not negative but for rounding
     ax = min(max(int((low_x - place[2]) / place[0] - 1e-9), 0), last_x)
     ay = min(max(int((low_y - place[3]) / place[1] - 1e-9), 0), last_y)
@@ -131,7 +99,7 @@ def highest_at(land: Land, x: float, y: float, size_x: float, size_y: float) -> 
     while (1 << level) < span:
         level += 1
     ax, ay, bx, by = ax >> level, ay >> level, bx >> level, by >> level
-    start, width, table = land.offsets[level], land.widths[level], land.tables[Z_HIGH]
+    start, width, table = spline.offsets[level], spline.widths[level], spline.tables[Z_HIGH]
     lower, upper = start + ay * width, start + by * width
     lowest = min(min(table[lower + ax], table[lower + bx]), min(table[upper + ax], table[upper + bx]))
     return float(place[4] - lowest)
@@ -150,7 +118,7 @@ def farthest(plane: Array) -> float:
 
 
 @lean
-def section_at(land: Land, plane: Array, s: float, guess: float, close: float, room: Room, out: Array) -> None:
+def section_at(land: FieldArrays, plane: Array, s: float, guess: float, close: float, room: Room, out: Array) -> None:
     """The ground curve of one plane at ``s`` into ``out`` (COLUMNS,), by Newton in w from ``guess`` until a step is
     ``close``; see :func:`bodyplan.gaits.carry.planes.section`."""
     vertical = upright(plane)
@@ -173,6 +141,6 @@ def section_at(land: Land, plane: Array, s: float, guess: float, close: float, r
 
 
 @lean
-def foot_at(land: Land, plane: Array, s: float, room: Room, out: Array) -> None:
+def foot_at(land: FieldArrays, plane: Array, s: float, room: Room, out: Array) -> None:
     """The same to rounding, from nowhere."""
     section_at(land, plane, s, 0.0, 1e-15 * (1.0 + farthest(plane)), room, out)
