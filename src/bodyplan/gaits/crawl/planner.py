@@ -114,7 +114,7 @@ class Planner:
         count = len(self.legs)
         feet, failure = np.zeros((count, 3)), Failure()
         total = math.ceil(until / self.step_time)
-        total += (total * self.step_time < until) - ((total - 1) * self.step_time >= until > 0.0)
+        total += int(total * self.step_time < until) - int((total - 1) * self.step_time >= until > 0.0)
         self._look_ahead(-1 - count, min(total, AT_ONCE))
         for place, leg in enumerate(self.order):
             feet[leg], why = self._footholds(place - count).first

@@ -13,7 +13,7 @@ from bodyplan.gaits.crawl.legs import Legs
 from bodyplan.gaits.crawl.shell_kernel import around, last_moved, nearest_slim, nearest_to_box, placed
 from bodyplan.ground.base import Ground
 from bodyplan.ground.field import Field
-from bodyplan.ground.near import clearance_up_to, segment_clearance_up_to
+from bodyplan.ground.near import segment_clearance_up_to
 from bodyplan.ground.plane import Plane
 from bodyplan.robot.elements import Contact
 from bodyplan.robot.neighbours import separate_contacts
@@ -86,7 +86,7 @@ class Shell:
                 since, fresh = np.broadcast_to(np.arange(len(poses))[:, None], since.shape), np.ones_like(fresh)
             rows, parts = np.nonzero(fresh & ~off[:, None])
             caps = (most[:count] + radii + EXACT)[parts]
-            out[rows, parts] = _segment_gaps(ground, ends[rows, parts], caps) - radii[parts]
+            out[rows, parts] = segment_clearance_up_to(ground, ends[rows, parts], caps) - radii[parts]
             out[:, :count] = np.take_along_axis(out[:, :count], since, axis=0)
             out[off, :count] = -np.inf
         for j, k in enumerate(self.boxes, start=len(self.slim)):
@@ -164,15 +164,11 @@ class Shell:
 
     def _box_gaps(self, ground: Ground, k: int, poses: Array, most: float) -> Array:
         box = self._contact(k)
-        curved = isinstance(ground, Field)
-        local = _faces(box) if curved else box.points()[_edges(box)].reshape(-1, 3)
+        local = _faces(box) if isinstance(ground, Field) else box.points()[_edges(box)].reshape(-1, 3)
         places, out = self._placed(poses, (k,), local[None])[:, 0], np.full(len(poses), -np.inf)
         for rows in _on(ground, places):
-            if curved:
-                out[rows] = most + EXACT
-                near = rows[~_far(ground, places[rows], np.full(len(rows), most + EXACT))]
-                if len(near):
-                    out[near] = clearance_up_to(ground, places[near], most + EXACT).min(axis=1)
+            if isinstance(ground, Field):
+                _, out[rows] = ground.nearest_up_to(places[rows], np.full(len(rows), most + EXACT))
             else:
                 out[rows] = segment_clearance_up_to(ground, places[rows].reshape(len(rows), -1, 2, 3), most).min(axis=1)
         return out
@@ -193,28 +189,6 @@ def _moves(points: Array, wanted: BoolArray | None) -> tuple[IntArray, BoolArray
     rows, parts = np.nonzero(np.ones_like(fresh) if wanted is None else wanted)
     fresh[since[rows, parts], parts] = True
     return since, fresh
-
-
-def _segment_gaps(ground: Ground, ends: Array, caps: Array) -> Array:
-    """Clearances (n,) m of segments (n, 2, 3), up to ``caps`` (n,) m."""
-    out = caps.copy()
-    near = np.flatnonzero(~_far(ground, ends, caps))
-    if len(near):
-        out[near] = segment_clearance_up_to(ground, ends[near], caps[near])
-    return out
-
-
-def _far(ground: Ground, points: Array, caps: Array) -> BoolArray:
-    """Of convex shapes with corners ``points`` (n, p, 3), those known to be farther above the ground than ``caps`` (n,)
-    m: from bounds of its height around all of a shape."""
-    if not isinstance(ground, Field) or not len(points):
-        return np.zeros(len(points), dtype=bool)
-    low, high = points.min(axis=1), points.max(axis=1)
-    reach = np.maximum(caps, EXACT)[:, None]
-    edge_low, edge_high = ground.field_box
-    around = (np.clip(corner, edge_low, edge_high) for corner in (low[:, :2] - reach, high[:, :2] + reach))
-    top = ground.field_bounds(*around).z[1]
-    return np.asarray(low[:, 2] - top > reach[:, 0])
 
 
 @lru_cache(maxsize=32)
