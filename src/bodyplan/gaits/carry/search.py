@@ -119,8 +119,9 @@ class _Search:
         least, convex = self.judge(planes, at, middle, half)
         near = least < self.value[owner] * (1.0 + TWICE)
         simple = np.flatnonzero(near & convex)
-        self.descend(owner[simple], low[simple], high[simple])
-        promising = near & ~convex & (least < self.value[owner] * (1.0 - TOLERANCE))
+        judged = np.zeros(len(owner), dtype=np.bool_)
+        judged[simple] = self.descend(owner[simple], low[simple], high[simple])
+        promising = near & ~judged & (least < self.value[owner] * (1.0 - TOLERANCE))
         # a cell this small holds an edge of the ground, and its middle is it
         wide = half > 1e-14 * (np.abs(planes.centre).max(axis=1) + self.value[owner])
         self.note(np.flatnonzero(promising & ~wide), owner, middle, at)
@@ -147,12 +148,14 @@ class _Search:
         # a cell without ground in its middle has not been judged
         return np.where(at.found, least, aside), np.asarray(known.valid & (mu > 0.0))
 
-    def descend(self, owner: IntArray, low: Array, high: Array) -> None:
-        """The one minimum of Phi in each of these cells: Newton on Phi', kept inside by bisection."""
+    def descend(self, owner: IntArray, low: Array, high: Array) -> BoolArray:
+        """The one minimum of Phi in each of these cells: Newton on Phi', kept inside by bisection. (n,) False where the
+        section was not found on the way, and nothing is known."""
         planes = self.planes.take(owner)
-        ends = [self.slopes(planes, end)[0] for end in (low, high)]
+        (first, *_, begins), (last, *_, ends) = (self.slopes(planes, end) for end in (low, high))
+        known = begins & ((first >= 0.0) | ends)
         # at an end of a cell there is no minimum: the curve goes on
-        inner = np.flatnonzero(~((ends[0] >= 0.0) | (ends[1] <= 0.0)))
+        inner = np.flatnonzero(known & (first < 0.0) & (last > 0.0))
         owner, a, b = owner[inner], low[inner], high[inner]
         planes, s = planes.take(inner), 0.5 * (a + b)
         active = np.arange(len(owner))
@@ -160,21 +163,24 @@ class _Search:
             if not len(active):
                 break
             here = s[active]
-            slope, bend, distance = self.slopes(planes.take(active), here)
+            slope, bend, distance, found = self.slopes(planes.take(active), here)
+            known[inner[active[~found]]] = False
             a[active] = np.where(slope < 0.0, here, a[active])
             b[active] = np.where(slope > 0.0, here, b[active])
             newton = here - slope / bend
             inside = (newton >= a[active]) & (newton <= b[active]) & (bend > 0.0)
             s[active] = np.where(inside, newton, 0.5 * (a[active] + b[active]))
-            active = active[np.abs(s[active] - here) > 1e-10 * distance]
+            active = active[found & (np.abs(s[active] - here) > 1e-10 * distance)]
         at = section(self.ground, planes, s)
+        known[inner[~at.found]] = False
         self.take(owner, s, np.where(at.found, np.hypot(s, at.w), np.nan))
-        self.note(np.arange(len(owner)), owner, s, at)
+        self.note(np.flatnonzero(known[inner]), owner, s, at)
+        return known
 
-    def slopes(self, planes: Planes, s: Array) -> tuple[Array, Array, Array]:
-        """Phi', Phi'' and D at s (n,)."""
+    def slopes(self, planes: Planes, s: Array) -> tuple[Array, Array, Array, BoolArray]:
+        """Phi', Phi'' and D at s (n,), and where the section was found."""
         at = section(self.ground, planes, s)
-        return s + at.w * at.first, 1.0 + at.first**2 + at.w * at.second, np.hypot(s, at.w)
+        return s + at.w * at.first, 1.0 + at.first**2 + at.w * at.second, np.hypot(s, at.w), at.found
 
     def note(self, index: IntArray, owner: IntArray, s: Array, at: Section) -> None:
         """Remember minima at ``s``."""
