@@ -162,7 +162,7 @@ def test_the_smallest_of_many_with_ties() -> None:
         values = rng.integers(0, 9, rng.integers(1, 40)).astype(float)
         k = int(rng.integers(1, len(values) + 1))
         want = np.sort(values)[:k]
-        assert _smallest(values.copy(), len(values), k) == (want[-1], np.count_nonzero(want == want[-1]))
+        assert _smallest(values.copy(), k) == (want[-1], np.count_nonzero(want == want[-1]))
 
 
 def test_the_centre_of_a_bowl_ties_everywhere() -> None:

@@ -63,9 +63,13 @@ def clearances(field: FieldArrays, points: Array, group: int, room: Room, found:
             out[n] = _clearance(field, points[at], out[n], room, found[n])
             if math.isnan(out[n]):
                 return at
-        elif not _are_far(field, points, at, end, group, room, out):
-            together //= 2
-            continue
+        else:
+            reach = 0.0
+            for n in range(at // group, (end - 1) // group + 1):
+                reach = max(reach, out[n])
+            if not _are_far(field, points[at:end], reach, room):
+                together //= 2
+                continue
         at = end
         while together < _TOGETHER and at % (2 * together) == 0:
             together *= 2
@@ -73,17 +77,13 @@ def clearances(field: FieldArrays, points: Array, group: int, room: Room, found:
 
 
 @lean
-def _are_far(field: FieldArrays, points: Array, first: int, end: int, group: int, room: Room, caps: Array) -> bool:
-    """Whether bounds show that points from ``first`` to before ``end`` are all above the ground, and farther from it
-    than the caps of their groups."""
-    reach = 0.0
-    for n in range(first // group, (end - 1) // group + 1):
-        reach = max(reach, caps[n])
+def _are_far(field: FieldArrays, points: Array, reach: float, room: Room) -> bool:
+    """Whether bounds show that ``points`` (k, 3) are all above the ground and farther from it than ``reach``."""
     if not math.isfinite(reach):
         return False
     low_x = low_y = lowest = np.inf
     high_x = high_y = -np.inf
-    for k in range(first, end):
+    for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         low_x, high_x = min(low_x, x), max(high_x, x)
         low_y, high_y = min(low_y, y), max(high_y, y)
@@ -220,33 +220,32 @@ def _search(field: FieldArrays, p: Array, value: float, room: Room, best: Array)
             break
         last, ties = np.inf, 0
         if kept > MAX_BOXES:
-            last, ties = _smallest(room.sizes, kept, MAX_BOXES)
+            last, ties = _smallest(room.sizes[:kept], MAX_BOXES)
         cut = 0
         for k in range(count):
             it = boxes[now, k]
             if it[LEAST] < last or (it[LEAST] == last and ties > 0):
                 ties -= 1 if it[LEAST] == last else 0
-                _quarter(it, boxes[then], cut)
+                _quarter(it, boxes[then, cut : cut + 4])
                 cut += 4
         now, then, count = then, now, cut
     return value
 
 
 @lean
-def _quarter(it: Array, into: Array, first: int) -> None:
-    """The four quarters of a box into the rows from ``first`` on."""
+def _quarter(it: Array, into: Array) -> None:
+    """The four quarters of a box into the rows of ``into`` (4, BOX)."""
     x, y = 0.5 * (it[LOW_X] + it[HIGH_X]), 0.5 * (it[LOW_Y] + it[HIGH_Y])
     for k in range(4):
-        part = into[first + k]
+        part = into[k]
         part[LOW_X], part[HIGH_X] = (it[LOW_X], x) if k < 2 else (x, it[HIGH_X])
         part[LOW_Y], part[HIGH_Y] = (it[LOW_Y], y) if k % 2 == 0 else (y, it[HIGH_Y])
 
 
 @lean
-def _smallest(values: Array, count: int, k: int) -> tuple[float, int]:
-    """The k-th smallest of the first ``count`` values, which are put in another order, and how many of the k smallest
-    are equal to it."""
-    low, high = 0, count - 1
+def _smallest(values: Array, k: int) -> tuple[float, int]:
+    """The k-th smallest of ``values``, which are put in another order, and how many of the k smallest equal it."""
+    low, high = 0, len(values) - 1
     while low < high:
         pivot, i, j = values[(low + high) // 2], low, high
         while i <= j:
