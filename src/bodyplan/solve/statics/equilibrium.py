@@ -173,13 +173,37 @@ def balance(equations: Array, load: Array) -> Balance:
     return balances_of(equations[None], load[None])[0]
 
 
-def balances_of(equations: Array, load: Array) -> list[Balance]:
-    """:func:`balance` of n items: equations (n, 6, 3k), load (n, 6)."""
-    U, s, V = np.linalg.svd(equations, full_matrices=False)
-    ranks = np.sum(s > RANK * s.max(axis=1, keepdims=True, initial=0.0), axis=1)
+class Parts(NamedTuple):
+    """Singular parts of the equations of n items: U (n, 6, m), s (n, m), V (n, m, 3k)."""
+
+    U: Array
+    s: Array
+    V: Array
+
+    @staticmethod
+    def of(equations: Array) -> Parts:
+        """Of equations (n, 6, 3k)."""
+        return Parts(*np.linalg.svd(equations, full_matrices=False))
+
+    @property
+    def counts(self) -> BoolArray:
+        """(n, m): which of them are more than rounding."""
+        return np.asarray(self.s > RANK * self.s.max(axis=1, keepdims=True, initial=0.0))
+
+    @property
+    def inverse(self) -> Array:
+        """(n, 6, 3k): transposed pseudo-inverses of the equations."""
+        share = np.where(self.counts, 1.0 / np.where(self.counts, self.s, 1.0), 0.0)
+        return np.asarray((self.U * share[:, None]) @ self.V)
+
+
+def balances_of(equations: Array, load: Array, parts: Parts | None = None) -> list[Balance]:
+    """:func:`balance` of n items: equations (n, 6, 3k), load (n, 6); ``parts`` of the equations, if they are known."""
+    parts = Parts.of(equations) if parts is None else parts
+    U, s, V = parts
     turned = np.einsum("nij,ni->nj", U, -load)
     out = []
-    for i, rank in enumerate(ranks.tolist()):
+    for i, rank in enumerate(parts.counts.sum(axis=1).tolist()):
         left = float(np.linalg.norm(load[i] + U[i, :, :rank] @ turned[i, :rank]))
         out.append(Balance(V[i, :rank], turned[i, :rank] / s[i, :rank], left, U[i, :, :rank], s[i, :rank]))
     return out

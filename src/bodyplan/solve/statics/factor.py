@@ -22,8 +22,12 @@ NEAR = 5e-3
 FAINT = (1e-6, 1e-4, 1e-2)
 #: coefficients beyond this are no friction
 MOST = 1e8
+#: the least factor that a search starts from, and how many of its first steps Newton's method tries to finish
+LEAST_GUESS, EARLY = 1e-2, 4
 #: residual of the conditions of optimality up to which a solution is one
 PROVED = 1e-11
+#: and up to which a few steps of Newton's method have been enough
+EXACT = 1e-14
 
 
 #: x, y and s of a similar problem
@@ -80,21 +84,22 @@ def least_factor(A: Array, b: Array, family: Family, start: Start | None = None)
     """
     k, nothing = len(family.slope), np.zeros(len(b))
     if start is not None:
-        done = polish_ratio(A, b, family, *start)
-        if _proved(A, family, done):
+        done = polish_ratio(A, b, family, *start, WARM)
+        if done.residual <= EXACT and _proved(A, family, done):
             return Factor(done.s, done.x, done.y, family.touching)
     normal = along_normals(A, b)
     if normal is not None:
         return Factor(0.0, normal[:, None] * np.array([1.0, 0.0, 0.0]), nothing, family.touching)
     if not holds_with_any_friction(A, b, family.kind == CONE):
         return Factor(np.inf, np.zeros((k, 3)), nothing, family.touching)
-    return _searched(A, b, family)
+    return _searched(A, b, family, 1.0 if start is None else start[2])
 
 
-def _searched(A: Array, b: Array, family: Family) -> Factor:
-    """With forces of moderate size, and only if these reach for more, with large ones."""
+def _searched(A: Array, b: Array, family: Family, guess: float) -> Factor:
+    """With forces of moderate size, and only if these reach for more, with large ones; from a ``guess`` of the least
+    factor on."""
     k, size = len(family.slope), max(1.0, float(np.linalg.norm(b)))
-    s, high = 1.0, np.inf
+    s, high = min(max(guess, LEAST_GUESS), 1.0), np.inf
     for bound in (MODERATE * size, SQUEEZED * size):
         found = _descended(A, b, family, bound, s, high)
         if found.exact:
@@ -119,7 +124,7 @@ def _descended(A: Array, b: Array, family: Family, bound: float, s: float, high:
     k, floor = len(family.slope), 0.0
     weight = np.ones(k)
     best = np.zeros((k, 3)), np.zeros(len(b))
-    for _ in range(60):
+    for attempt in range(60):
         found = least_excess(A, b, family.kind, s * family.slope, family.cap, weight, bound)
         x = found.x + (A.T @ (b - A @ found.x.ravel())).reshape(k, 3)
         reached = family.needs(np.where(np.abs(x) < 1e-9 * np.abs(x).max(initial=0.0), 0.0, x))
@@ -130,6 +135,15 @@ def _descended(A: Array, b: Array, family: Family, bound: float, s: float, high:
             reached = min(reached, s)
         if reached <= high:
             high, best = reached, (x, found.y)
+        if np.isfinite(high) and attempt < EARLY:
+            # what is proved is the least, however far away the search still is
+            near = polish_ratio(A, b, family, x, found.y, min(max(s, floor), high), WARM)
+            if (
+                near.residual <= EXACT
+                and _proved(A, family, near)
+                and floor * (1.0 - 1e-4) <= near.s <= high * (1.0 + 1e-4)
+            ):
+                return Factor(near.s, near.x, near.y, family.touching)
         if np.isfinite(high) and (abs(found.slack) < 1e-5 or high - floor <= 1e-5 * high):
             done = _finished(A, b, family, x, found.y, min(max(s, floor), high))
             if done.residual <= PROVED and floor * (1.0 - 1e-4) <= done.s <= high * (1.0 + 1e-4):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array
 from bodyplan.errors import Status
 from bodyplan.solve.statics.cones import Family, ratios
-from bodyplan.solve.statics.equilibrium import RANK, ROUNDING, Loads, Memory, balances_of
+from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, Memory, Parts, balances_of
 from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import at_least_factor
 from bodyplan.solve.statics.outcome import Outcome, shaped
@@ -90,7 +90,8 @@ class LeastFriction:
 
     def __init__(self, loads: Loads) -> None:
         self.loads, self._equations = loads, loads.equations()
-        self.balances = balances_of(self._equations, loads.load)
+        self._parts = Parts.of(self._equations)
+        self.balances = balances_of(self._equations, loads.load, self._parts)
         self._memories: dict[int, tuple[Memory, float]] = {}
 
     @staticmethod
@@ -130,5 +131,4 @@ class LeastFriction:
 
     @cached_property
     def _inverse(self) -> Array:
-        """(n, 6, 3k): transposed pseudo-inverses of the equations."""
-        return np.swapaxes(np.linalg.pinv(self._equations, rcond=RANK), -1, -2)
+        return self._parts.inverse
