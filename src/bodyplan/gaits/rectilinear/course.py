@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -248,21 +249,20 @@ def _over_steps(
 
 def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: float) -> tuple[Way, int]:
     """The first way at a good pace that searches find, narrow ones first, or else the farthest; and how many stances
-    were tried. Where a search does not go on under a ceiling the snake comes to low places stretched."""
+    were tried. Where narrow ones find none under a ceiling the snake comes to low places stretched."""
     walkers = [walker]
     if np.isfinite(walker.track.steps.roof_z).any():
         walkers.append(replace(walker, crouch=float(walker.demands.straight.max())))
     tried, far = 0, wanted * pace
     ways: list[Way] = []
-    for breadth in (*NARROW, WIDE):
-        for each in walkers:
-            way = search(each, start, schedule, wanted, pace, breadth)
-            tried += way.tried
-            share = (way.far - float(start[:, 0].mean())) / far if far > 0.0 else 1.0
-            if way.status == Status.OK and share >= BRISK:
-                return way, tried
-            if breadth is WIDE or (way.status == Status.OK and share >= SLOW):
-                ways.append(way)
+    for each, breadth in [*product(walkers, NARROW), *product(walkers, [WIDE])]:
+        way = search(each, start, schedule, wanted, pace, breadth)
+        tried += way.tried
+        share = (way.far - float(start[:, 0].mean())) / far if far > 0.0 else 1.0
+        if way.status == Status.OK and share >= BRISK:
+            return way, tried
+        if breadth is WIDE or (way.status == Status.OK and share >= SLOW):
+            ways.append(way)
     return max(ways, key=lambda w: (w.status == Status.OK, w.far)), tried
 
 

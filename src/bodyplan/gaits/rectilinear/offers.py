@@ -48,8 +48,8 @@ class Offers(NamedTuple):
     """What is known of the landing spots of the anchors ``group`` (G,) of a stance ``here`` (N, 2): ``spots``
     (G, K, 4), ascending, with s and height m, lift m and how early the swing rises; ``known`` (G, K) :data:`UNKNOWN`,
     negative for those where nothing goes; ``last`` (G,) the farthest that goes and ``at`` (G,) the one that is offered,
-    -1 where there is none; ``offered`` (G, 4) the spots ``at``, or where the anchor stands; ``order`` (G, p) of places,
-    those first at which swings failed last."""
+    -1 where there is none; ``after`` (N, 2), ``lift`` and ``early`` (N,): the move to the spots ``at``; ``order``
+    (G, p) of places, those first at which swings failed last."""
 
     here: Array
     group: IntArray
@@ -57,7 +57,9 @@ class Offers(NamedTuple):
     known: IntArray
     last: IntArray
     at: IntArray
-    offered: Array
+    after: Array
+    lift: Array
+    early: Array
     order: Array
 
 
@@ -182,11 +184,8 @@ def _nearer(
 @lean
 def _tell(offers: Offers, g: int) -> None:
     k, i = offers.at[g], offers.group[g]
-    for c in range(4):
-        offers.offered[g, c] = offers.spots[g, k, c]
-    if k < 0:
-        offers.offered[g, 0], offers.offered[g, 1] = offers.here[i, 0], offers.here[i, 1]
-        offers.offered[g, 2], offers.offered[g, 3] = 0.0, 1.0
+    offers.after[i, 0], offers.after[i, 1] = offers.spots[g, k, 0], offers.spots[g, k, 1]
+    offers.lift[i], offers.early[i] = offers.spots[g, k, 2], offers.spots[g, k, 3]
 
 
 @njit(cache=True)
@@ -204,7 +203,9 @@ def farthest(
         np.empty((size, most), dtype=np.int64),
         np.empty(size, dtype=np.int64),
         np.empty(size, dtype=np.int64),
-        np.empty((size, 4)),
+        here.copy(),
+        np.zeros(len(here)),
+        np.ones(len(here)),
         np.empty((size, len(choice.places))),
     )
     trial, at = trial_of(bounds, here, choice.places), np.empty(most)
@@ -221,8 +222,8 @@ def farthest(
             offers.known[g] = UNKNOWN
             _farthest(bounds, steps, keeps, ranges, choice, met, offers, trial, g, n)
             if offers.at[g] >= 0:
+                _tell(offers, g)
                 break
-        _tell(offers, g)
         offers.order[g] = trial.order
     return offers
 

@@ -48,7 +48,7 @@ class Breadth:
 
 #: a few stances that differ much find most ways, one such choice of them where another does not; where none does, many
 #: that differ little decide
-NARROW = (Breadth(8, 0.4, 200), Breadth(8, 0.5, 200), Breadth(12, 0.3, 300))
+NARROW = (Breadth(8, 0.4, 100), Breadth(8, 0.5, 200), Breadth(12, 0.3, 300))
 WIDE = Breadth(16, 0.1, 500)
 #: how much higher a swing is made that comes too near to something between the places at which moves are tried
 HIGHER = (1.02, 1.05, 1.1, 1.2)
@@ -70,7 +70,7 @@ class _State:
     @cached_property
     def far(self) -> float:
         """m: mean of the anchors."""
-        return float(self.anchors[:, 0].mean())
+        return float(np.add.reduce(self.anchors[:, 0])) / len(self.anchors)
 
     def then(self, phases: int) -> tuple[int, int]:
         """Phase and cycle after this one's."""
@@ -233,8 +233,6 @@ def _sound(walker: Walker, states: list[_State]) -> list[_State]:
 
 def _moved(state: _State, offers: Offers, name: str, phases: int) -> _State:
     """The state after the anchors have moved to what is offered."""
-    after, lift, early = state.anchors.copy(), np.zeros((1, len(state.anchors))), np.ones((1, len(state.anchors)))
-    after[offers.group] = offers.offered[:, :2]
-    lift[0, offers.group], early[0, offers.group] = offers.offered[:, 2], offers.offered[:, 3]
+    after, lift, early = offers.after.copy(), offers.lift[None].copy(), offers.early[None].copy()
     move = Moves(state.anchors[None], after[None], lift, early, (name,))
     return _State(after, *state.then(phases), state.made + 1, state.held, state, move)

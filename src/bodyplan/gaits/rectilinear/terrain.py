@@ -184,13 +184,22 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
     for k in range(first, last):
         x0, z0 = origins[k, 0], origins[k, 1]
         x1, z1 = (origins[k + 1, 0], origins[k + 1, 1]) if k < 2 * count - 1 else (x0 + keeps.head, z0)
+        low, high = min(x0, x1), max(x0, x1)
         if not (clear or floor) and min(z0, z1) - ground < reach:
-            more = keeps.low if k == 0 or k == 2 * count - 1 else keeps.margin
-            floor = nearer(floor_x, floor_z, x0, z0, x1, z1, keeps.body - slack)
-            floor = floor or _at_corner(floor_x, floor_z, x0, z0, x1, z1, keeps.body + more, none)
+            at = left_of(floor_x, low - reach)
+            if at == len(floor_x) or floor_x[at] > high + reach:  # level all along
+                floor = min(z0, z1) - floor_z[at] < keeps.body - slack
+            else:
+                more = keeps.low if k == 0 or k == 2 * count - 1 else keeps.margin
+                floor = nearer(floor_x, floor_z, x0, z0, x1, z1, keeps.body - slack)
+                floor = floor or _at_corner(floor_x, floor_z, x0, z0, x1, z1, keeps.body + more, none)
         # links keep from the ceiling what the joints must: those are where it is nearest
         if not ceiling and max(z0, z1) + roof > -above:
-            ceiling = nearer(steps.roof_x, steps.roof_z, x0, -z0, x1, -z1, above - none)
+            at = left_of(steps.roof_x, low - above)
+            if at == len(steps.roof_x) or steps.roof_x[at] > high + above:
+                ceiling = -max(z0, z1) - steps.roof_z[at] < above - none
+            else:
+                ceiling = nearer(steps.roof_x, steps.roof_z, x0, -z0, x1, -z1, above - none)
     return floor, ceiling
 
 
