@@ -121,9 +121,10 @@ def test_solved_is_that_of_numpy_or_of_least_square():
     rng = np.random.default_rng(1)
     square, wanted = rng.normal(size=(100, 3, 3)), rng.normal(size=(100, 3))
     square[::10, :, 2] = square[::10, :, 0] + 2.0 * square[::10, :, 1]
+    room = np.empty((6, 3))
     x, sides = np.empty((100, 3)), np.array([leg_kernel.side_of(one) for one in square])
     for one, b, out in zip(square, wanted, x, strict=True):
-        leg_kernel.solve(one, b, out)
+        leg_kernel.solve(one, b, out, room)
     regular = sides != 0
     assert np.array_equal(np.flatnonzero(~regular), np.arange(0, 100, 10))
     assert np.abs(x[regular] - np.linalg.solve(square[regular], wanted[regular, :, None])[..., 0]).max() < 1e-10
@@ -133,6 +134,32 @@ def test_solved_is_that_of_numpy_or_of_least_square():
     assert np.abs(x[~regular] - least).max() < 1e-10
     assert np.array_equal(sides[regular], np.sign(np.linalg.det(square[regular])))
     assert np.array_equal(bent(square), sides)
+
+
+def test_least_is_the_pseudoinverse():
+    """Of any rank, with directions just inside and outside of what counts, and of any size."""
+    rng = np.random.default_rng(2)
+    room, x = np.empty((6, 3)), np.empty(3)
+    for sizes in (
+        (1, 1, 1),
+        (1, 0.5, 1e-3),
+        (1, 1, 0),
+        (1, 1e-5, 0),
+        (1, 3e-6, 1e-7),
+        (1, 1e-8, 1e-9),
+        (1, 0, 0),
+        (0, 0, 0),
+    ):
+        for scale in (1.0, 1e-4, 1e5):
+            (u, _, v), b = np.linalg.svd(rng.normal(size=(3, 3))), rng.normal(size=3)
+            square = scale * (u * np.array(sizes, float)) @ v
+            leg_kernel.least(square, b, x, room)
+            want = np.linalg.pinv(square, leg_kernel.SINGULAR) @ b
+            kept = [size for size in sizes if size > leg_kernel.SINGULAR]
+            assert np.abs(x - want).max() <= 1e-14 * np.abs(want).max() / min(kept, default=1.0) + 1e-300
+    columns = np.array([[1.0, 2.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 3.0]])  # two alike, to the digit
+    leg_kernel.least(columns, np.array([5.0, 7.0, 6.0]), x, room)
+    assert np.abs(x - [1.0, 2.0, 2.0]).max() < 1e-15
 
 
 # --- SILO4, whose legs have a closed form ---

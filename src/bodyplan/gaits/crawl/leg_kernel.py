@@ -17,6 +17,8 @@ from bodyplan.curves.pieces import lean
 #: most steps of Newton, and after how many that do not halve the error it gives up; the error in m at which a foot is
 #: in place; the longest step of a joint (rad, or m)
 STEPS, PATIENCE, PLACED, STRIDE = 60, 15, 1e-13, 0.3
+#: most sweeps of rotations that make the columns of a matrix (3, 3) upright to each other
+SWEEPS = 30
 #: smallest volume that the directions of a leg's joints span at which it can still be told its joints
 SINGULAR = 1e-6
 #: variables of a row
@@ -54,7 +56,7 @@ class Postures(NamedTuple):
     sides: IntArray
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@lean
 def chain(T: Tables, leg: int, q: Array, F: Array) -> None:
     """Frames ``F`` (rows + 1, 12) of a leg at ``q`` (n,), that of the base first."""
     first = T.starts[leg]
@@ -83,7 +85,7 @@ def chain(T: Tables, leg: int, q: Array, F: Array) -> None:
             F[k + 1, 5 + 3 * i] = ce * z - se * left
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@lean
 def moves(T: Tables, leg: int, F: Array, foot: Array, S: Array) -> None:
     """The place ``foot`` (3,) of a leg with frames ``F``, and how it moves with its three joints, ``S`` (3, 3)."""
     first, count = T.starts[leg], T.starts[leg + 1] - T.starts[leg]
@@ -109,7 +111,7 @@ def moves(T: Tables, leg: int, F: Array, foot: Array, S: Array) -> None:
             S[2, slot] += scale * z
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@lean
 def volume(S: Array) -> float:
     """Determinant of ``S`` (3, 3)."""
     return float(
@@ -119,7 +121,7 @@ def volume(S: Array) -> float:
     )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@lean
 def side_of(S: Array) -> int:
     """1 or -1: to which side a leg is bent, the sign of the determinant of ``S`` (3, 3); 0 where it is singular."""
     size = 1.0
@@ -131,14 +133,54 @@ def side_of(S: Array) -> int:
     return 1 if v > 0.0 else -1
 
 
-@njit(cache=True, nogil=True)
-def solve(S: Array, b: Array, x: Array) -> None:
-    """``x`` (3,) of S x = b by Cramer's rule; the least x of least error where ``S`` is all but singular."""
+@lean
+def solve(S: Array, b: Array, x: Array, M: Array) -> None:
+    """``x`` (3,) of S x = b by Cramer's rule; the least x of least error where ``S`` is all but singular. ``M`` (6, 3):
+    room."""
     if not regular(S, b, x):
-        x[:] = np.linalg.pinv(S, SINGULAR) @ b
+        least(S, b, x, M)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@lean
+def least(S: Array, b: Array, x: Array, M: Array) -> None:
+    """The least ``x`` (3,) of least error of S x = b, without directions in which ``S`` moves less than SINGULAR of the
+    most: from its singular values by one-sided rotations (Hestenes 1958). ``M`` (6, 3): room."""
+    for i in range(3):
+        for j in range(3):
+            M[j, i], M[3 + j, i] = S[i, j], 1.0 if i == j else 0.0
+    for _ in range(SWEEPS):
+        turned = False
+        for p in range(2):
+            for r in range(p + 1, 3):
+                pp = M[p, 0] * M[p, 0] + M[p, 1] * M[p, 1] + M[p, 2] * M[p, 2]
+                rr = M[r, 0] * M[r, 0] + M[r, 1] * M[r, 1] + M[r, 2] * M[r, 2]
+                pr = M[p, 0] * M[r, 0] + M[p, 1] * M[r, 1] + M[p, 2] * M[r, 2]
+                if abs(pr) <= 1e-16 * math.sqrt(pp * rr):
+                    continue
+                turned = True
+                zeta = 0.5 * (rr - pp) / pr
+                t = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                c = 1.0 / math.sqrt(1.0 + t * t)
+                s = c * t
+                for k in (0, 3):
+                    for i in range(3):
+                        u, v = M[p + k, i], M[r + k, i]
+                        M[p + k, i], M[r + k, i] = c * u - s * v, s * u + c * v
+        if not turned:
+            break
+    most = 0.0
+    for k in range(3):
+        most = max(most, M[k, 0] * M[k, 0] + M[k, 1] * M[k, 1] + M[k, 2] * M[k, 2])
+        x[k] = 0.0
+    for k in range(3):
+        square = M[k, 0] * M[k, 0] + M[k, 1] * M[k, 1] + M[k, 2] * M[k, 2]
+        if square > SINGULAR * SINGULAR * most:
+            share = (M[k, 0] * b[0] + M[k, 1] * b[1] + M[k, 2] * b[2]) / square
+            for i in range(3):
+                x[i] += share * M[3 + k, i]
+
+
+@lean
 def regular(S: Array, b: Array, x: Array) -> bool:
     """``x`` (3,) of S x = b by Cramer's rule; False where ``S`` is all but singular."""
     if side_of(S) == 0:
@@ -154,11 +196,11 @@ def regular(S: Array, b: Array, x: Array) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@lean
 def newton(T: Tables, leg: int, q: Array, target: Array, side: int, F: Array, W: Array) -> bool:
     """Move the joints of a leg in ``q`` (n,) so that its foot is at ``target`` (3,), as near as can be; whether it
-    comes there, bent to ``side``. ``F``, ``W`` (7, 3): room for frames and vectors."""
-    foot, off, step, found, S = W[0], W[1], W[2], W[3], W[4:7]
+    comes there, bent to ``side``. ``F``, ``W`` (13, 3): room for frames and vectors."""
+    foot, off, step, found, S, M = W[0], W[1], W[2], W[3], W[4:7], W[7:13]
     columns = T.columns[leg]
     best, bent, idle = np.inf, 0, 0
     scale = max(1.0, max(abs(target[0]), abs(target[1]), abs(target[2])))
@@ -177,8 +219,7 @@ def newton(T: Tables, leg: int, q: Array, target: Array, side: int, F: Array, W:
                 found[j] = q[columns[j]]
         if not (best > PLACED * scale and idle < PATIENCE):
             break
-        if not regular(S, off, step):
-            solve(S, off, step)
+        solve(S, off, step, M)
         longest = max(abs(step[0]), abs(step[1]), abs(step[2]))
         share = min(1.0, STRIDE / max(longest, 1e-300))
         for j in range(3):
@@ -188,7 +229,7 @@ def newton(T: Tables, leg: int, q: Array, target: Array, side: int, F: Array, W:
     return bool(best <= 100.0 * PLACED * scale and bent == side and bent != 0)
 
 
-@njit(cache=True, nogil=True)
+@lean
 def placed(
     T: Tables, P: Postures, leg: int, q: Array, guess: Array, target: Array, side: int, F: Array, W: Array
 ) -> bool:
@@ -201,7 +242,7 @@ def placed(
     return _placed_from_afar(T, P, leg, q, target, side, F, W)
 
 
-@njit(cache=True, nogil=True)
+@lean
 def _placed_from_afar(T: Tables, P: Postures, leg: int, q: Array, target: Array, side: int, F: Array, W: Array) -> bool:
     nearest, far = -1, np.inf
     for k in range(P.starts[leg], P.starts[leg + 1]):
@@ -239,7 +280,7 @@ def room(T: Tables) -> tuple[Array, Array]:
     most = 0
     for leg in range(len(T.starts) - 1):
         most = max(most, T.starts[leg + 1] - T.starts[leg])
-    return np.empty((most + 1, 12)), np.empty((7, 3))
+    return np.empty((most + 1, 12)), np.empty((13, 3))
 
 
 @njit(cache=True, nogil=True)
@@ -331,18 +372,18 @@ def rates(T: Tables, q: Array, velocity: Array, acceleration: Array, qd: Array, 
     """Joint rates ``qd`` and accelerations ``qdd`` (B, n), zero before, at ``q`` (B, n) for feet that move with
     ``velocity`` and ``acceleration`` (B, m, 3)."""
     F, W = room(T)
-    foot, bias, x, S = W[0], W[1], W[2], W[4:7]
+    foot, bias, x, S, M = W[0], W[1], W[2], W[4:7], W[7:13]
     for b in range(len(q)):
         for leg in range(velocity.shape[1]):
             columns = T.columns[leg]
             chain(T, leg, q[b], F)
             moves(T, leg, F, foot, S)
-            solve(S, velocity[b, leg], x)
+            solve(S, velocity[b, leg], x, M)
             for j in range(3):
                 qd[b, columns[j]] = x[j]
             drift(T, leg, qd[b], F, bias)
             for i in range(3):
                 bias[i] = acceleration[b, leg, i] - bias[i]
-            solve(S, bias, x)
+            solve(S, bias, x, M)
             for j in range(3):
                 qdd[b, columns[j]] = x[j]
