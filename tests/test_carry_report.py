@@ -1,6 +1,7 @@
 """The report of a body on wheels: its table, plots, figures and maps tell what the plan and the statics say."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from matplotlib.figure import Figure
 
 import bodyplan as bp
 from bodyplan.check import check
-from bodyplan.gaits.carry import wheel_rates
+from bodyplan.gaits.carry import hull, orientation, report, wheel_rates
+from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.show.beside import beside, check_facts
 from bodyplan.show.carrying import Carrying, _twists
 from bodyplan.show.carrying_figures import wheels_above, wheels_maps
@@ -152,3 +154,16 @@ def test_facts_that_need_a_library_may_be_missing() -> None:
     check_facts("plan.r_largest_torque", ["speed"], "m", bp.Carry.OPTIONAL_FACTS)
     with pytest.raises(bp.UnknownNameError, match="largest_angel"):
         check_facts("plan.largest_angel", ["speed"], "m", bp.Carry.OPTIONAL_FACTS)
+
+
+@pytest.mark.parametrize("ground", [bp.Surface("0.1*exp(-((x-0.3)**2 + y**2)/0.05)"), bp.Surface("0.03*sin(9*x)*y")])
+def test_the_clearance_is_that_of_all_points_of_all_samples(ground: bp.Surface) -> None:
+    wheels, rng, count = Wheels.of(bp.tri_wheel()), np.random.default_rng(4), 90
+    (box,) = hull.boxes(wheels.robot)
+    place = np.column_stack([rng.uniform(-1.0, 1.0, (count, 2)), rng.uniform(0.25, 0.4, count)])
+    turn = orientation.matrix(*rng.uniform(-0.3, 0.3, (3, count)))
+    ok = rng.random(count) < 0.8
+    at = place[:, None] + np.einsum("tij,pj->tpi", turn, hull.lower_face(box))
+    wanted = (at[..., 2] - ground.height(at[..., 0], at[..., 1]))[ok].min()
+    body = SimpleNamespace(position=place, turn=SimpleNamespace(matrix=turn))
+    assert report._clearance(wheels, ground, body, ok) == pytest.approx(wanted, abs=1e-14)
