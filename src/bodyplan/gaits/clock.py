@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from bodyplan.arrays import Array
+from bodyplan.arrays import Array, BoolArray
 
 
 class Clock:
@@ -33,22 +34,37 @@ class Clock:
         speed = 1.0 / (pace + change * step)
         return np.clip(self.nodes[cell] + step, 0.0, self.nodes[-1]), speed, -change * speed**3
 
-    def time(self, position: float) -> float:
-        """Time in [0, period] at a position."""
-        cell = int(np.clip(np.searchsorted(self.nodes, position, side="right") - 1, 0, len(self.nodes) - 2))
-        step = position - float(self.nodes[cell])
+    def time(self, position: ArrayLike) -> Array:
+        """Time in [0, period] at positions, any shape."""
+        at = np.asarray(position, dtype=np.float64)
+        cell = np.clip(np.searchsorted(self.nodes, at, side="right") - 1, 0, len(self.nodes) - 2)
+        step = at - self.nodes[cell]
         change = (self.pace[cell + 1] - self.pace[cell]) / (self.nodes[cell + 1] - self.nodes[cell])
-        return float(self.times[cell] + step * (self.pace[cell] + 0.5 * change * step))
+        return np.asarray(self.times[cell] + step * (self.pace[cell] + 0.5 * change * step))
+
+    def speed(self, position: Array) -> Array:
+        """Position's first derivative by time, at positions (S,)."""
+        return np.asarray(1.0 / np.interp(position, self.nodes, self.pace))
 
 
-def constant_rate_pace(nodes: Array, speeds: Array, softening: float) -> Array:
+def constant_rate_pace(
+    nodes: Array, speeds: Array, softening: float, jumps: BoolArray | None = None, ahead: float = 0.0
+) -> Array:
     """Pace at which the largest speed by position, ``speeds`` (K,) at the ``nodes``, becomes a constant rate.
 
     ``softening``: share of the mean speed that keeps the pace above 0 where the path stands still for an instant. The
-    path is periodic. Where speeds jump, the pace is already slow at the node before and still slow at the one after, so
-    that nothing overshoots between two nodes.
+    path is periodic. ``jumps`` (K - 1,): the cells inside of which speeds may jump anywhere, all others being smooth;
+    the pace is the same all along them, and otherwise slow by ``ahead`` (position) before and after what asks for it.
+    Where jumps are not known (None), it is already slow at the node before and still slow at the one after, so that
+    nothing overshoots between two nodes.
     """
-    around = np.concatenate([speeds[-2:-1], speeds, speeds[1:2]])
-    nearby = np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
+    if jumps is None:
+        around = np.concatenate([speeds[-2:-1], speeds, speeds[1:2]])
+        slow = np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
+    else:
+        before, after = (np.interp((nodes + h) % nodes[-1], nodes, speeds) for h in (-ahead, ahead))
+        slow = np.maximum(np.maximum(before, after), speeds)
+        begins = np.flatnonzero(np.concatenate([[True], ~jumps]))
+        slow = np.repeat(np.maximum.reduceat(slow, begins), np.diff(np.append(begins, len(nodes))))
     mean = float(np.trapezoid(speeds, nodes) / (nodes[-1] - nodes[0]))
-    return np.asarray(np.hypot(nearby, softening * mean))
+    return np.asarray(np.hypot(slow, softening * mean))

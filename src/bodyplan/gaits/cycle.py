@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bodyplan.arrays import Array
 from bodyplan.errors import InputError
 from bodyplan.gaits.clock import Clock, constant_rate_pace
+from bodyplan.gaits.rate_table import RateTable, rate_table
 from bodyplan.gaits.sweep import Sweep, Window
 
 #: even nodes of the table behind the time warp, per sweep
 TABLE = 1200
+#: cells of it that are narrower, as a share of the cycle, are none
+NARROWEST = 1e-11
+#: share of a sweep by which its warp is slow before and after a place that asks for it
+AHEAD = 1.0 / 4800.0
 #: what the largest joint rate may be above the largest one found
 PEAK_MARGIN = 1.008
 #: knots per unit of progress of the rounded angles of a smooth blend
 ROUNDING = 24
 #: share of the mean joint speed that softens the warp where the body stands still for an instant
 SOFTENING = {"linear": 1e-3, "smooth": 0.3}
-
-Shape = Callable[[Array], tuple[Array, Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -36,11 +41,6 @@ class CycleState:
     tail: Array
     number: Array
     u: Array
-
-
-def _largest_speeds(shape: Shape, position: Array) -> Array:
-    """Largest joint speed by position (S,)."""
-    return np.asarray(np.abs(np.diff(shape(position)[1], axis=1)).max(axis=1))
 
 
 class ExtensionCycle:
@@ -70,22 +70,23 @@ class ExtensionCycle:
         self.span = self.whole / waves
         plain = Clock(np.array([0.0, self.whole]), np.ones(2), self.whole)
         self._sweep_clock = plain
+        self._rounded: Callable[..., Any] | None = None
         if warp and waves > 1:
-            self._sweep_clock = self._warped(self._nodes(1), self._one, self.whole)
-        landing = self.whole - self._place(sweep.landing_start)
-        launching = self._place(sweep.launch_end)
+            self._sweep_clock = self._warped(1, self.whole)
+        landing = self.whole - float(self._place(sweep.landing_start))
+        launching = float(self._place(sweep.launch_end))
         if waves > 1 and landing + launching > self.span * (1.0 + 1e-12):
             raise InputError(
                 f"waves: {waves} waves of this extension would launch before the last has landed; use a smaller "
                 "extension or fewer waves."
             )
-        self._rounded = self._round() if blend == "smooth" else None
+        if blend == "smooth":
+            self._rounded = self._round()
         #: the head is anchored from here on
         self.switch = self.span - landing
-        nodes = self._nodes(waves)
-        self.clock = Clock(nodes, np.ones_like(nodes), duration / waves)
+        self.clock = Clock(np.array([0.0, self.span]), np.ones(2), duration / waves)
         if warp:
-            self.clock = self._warped(nodes, self._shape, duration / waves)
+            self.clock = self._warped(waves, duration / waves)
         #: largest joint rate found in looking for it, rad/s; None where no limit asks for it
         self.peak_rate: float | None = None
         if max_joint_rate is not None:
@@ -98,36 +99,52 @@ class ExtensionCycle:
         self._head_at_switch = reach[1]
         self.advance = reach[1] - reach[2]
 
-    def _place(self, u: float) -> float:
-        """Position of a u on the sweep's own clock, in [0, 2 T]."""
-        return self._sweep_clock.time(u + self.sweep.total)
+    def _place(self, u: ArrayLike) -> Array:
+        """Positions of any u on the sweep's own clock, in [0, 2 T]."""
+        return self._sweep_clock.time(np.asarray(u) + self.sweep.total)
+
+    @cached_property
+    def _table(self) -> RateTable:
+        return rate_table(self.sweep)
 
     def _nodes(self, waves: int) -> Array:
-        """Even positions of a cycle of some waves, and those around every place where a stage of a wave begins or
-        ends: joints may stand on a kink of the curve there and be fast on one side of it only."""
+        """Even positions of a cycle of some waves, and the places between which its rates are smooth: the nodes of the
+        sweep's table, for a smooth blend the bounds of stages, of every wave."""
         span = self.whole / waves
-        edges = [edge for w in self.sweep.windows for edge in (w.start, w.end)]
-        places = np.array([self._place(u) for u in (*edges, self.sweep.launch_end, self.sweep.landing_start)])
-        folded = np.concatenate([places - k * span for k in range(waves)])
         if self.blend == "linear":
-            folded = np.concatenate([folded, [0.0, span]])[:, None] + np.array([-1e-4, 0.0, 1e-4]) * span
+            marks = self._table.nodes
+        else:
+            edges = [edge for w in self.sweep.windows for edge in (w.start, w.end)]
+            marks = np.array([*edges, self.sweep.launch_end, self.sweep.landing_start])
+        places = self._place(marks)
+        if waves > 1:  # between the nodes of their clock, waves run smoothly
+            places = np.concatenate([places, self._sweep_clock.times])
+        folded = np.concatenate([places - k * span for k in range(waves)])
         folded = folded[(folded > 0.0) & (folded < span)]
         nodes = np.unique(np.concatenate([np.linspace(0.0, span, max(TABLE // waves, 200)), folded]))
-        nodes = nodes[np.concatenate([[True], np.diff(nodes) > 1e-9 * span])]
+        nodes = nodes[np.concatenate([[True], np.diff(nodes) > NARROWEST * span])]
         nodes[-1] = span
         return np.asarray(nodes)
 
-    def _warped(self, nodes: Array, shape: Shape, period: float) -> Clock:
-        speeds = _largest_speeds(shape, nodes)
-        # a joint that passes a kink of the curve may be fast between two nodes only: look closer where speeds change
-        change = np.abs(np.diff(speeds)) > (0.03 if self.blend == "linear" else np.inf) * speeds.max()
-        cells = np.flatnonzero(change | np.roll(change, 1) | np.roll(change, -1))
-        inner = (nodes[cells, None] + np.diff(nodes)[cells, None] * np.arange(1, 8) / 8.0).ravel()
-        if inner.size:
-            nodes = np.concatenate([nodes, inner])
-            order = np.argsort(nodes)
-            nodes, speeds = nodes[order], np.concatenate([speeds, _largest_speeds(shape, inner)])[order]
-        return Clock(nodes, constant_rate_pace(nodes, speeds, SOFTENING[self.blend]), period)
+    def _of_waves(self, position: Array, waves: int) -> tuple[Array, Array]:
+        """u (W, S) of some waves at positions (S,), and its derivative."""
+        of_waves = position + self.whole / waves * np.arange(waves)[:, None]
+        u, speed, _ = self._sweep_clock.position(np.minimum(of_waves, self.whole))
+        return u - self.sweep.total, speed
+
+    def _speeds(self, position: Array, waves: int, sides: bool = False) -> Array:
+        """Largest joint speed by position (S,), ascending, of a cycle of some waves; ``sides`` as in the table."""
+        if self._rounded is not None:
+            return np.asarray(np.abs(np.diff(self._rounded(position, 1), axis=1)).max(axis=1))
+        return self._table.largest(*self._of_waves(position, waves), sides)
+
+    def _warped(self, waves: int, period: float) -> Clock:
+        nodes, jumps = self._nodes(waves), None
+        if self.blend == "linear":
+            u = self._of_waves(0.5 * (nodes[1:] + nodes[:-1]), waves)[0]
+            jumps = np.asarray(self._table.jumps(u).any(axis=0))
+        speeds = self._speeds(nodes, waves)
+        return Clock(nodes, constant_rate_pace(nodes, speeds, SOFTENING[self.blend], jumps, AHEAD * self.whole), period)
 
     def _one(self, position: Array) -> tuple[Array, Array, Array]:
         """Angles of one wave and their derivatives by position on the sweep's clock."""
@@ -163,23 +180,23 @@ class ExtensionCycle:
         return CubicSpline(knots, angles, bc_type="periodic")
 
     def _peak_rate(self) -> float:
-        """Largest joint rate that is found on a grid, as fine as that of the warp, and once more around its peaks;
-        PEAK_MARGIN is for what lies between."""
-        count = 4 * max(TABLE // self.waves, 200)
-        step = self.clock.period / count
-        edges = self.clock.times[:-1, None] + np.array([-1e-7, 0.0, 1e-7]) * self.clock.period
-        at = np.unique(np.concatenate([np.arange(count) * step, edges.ravel() % self.clock.period]))
-        peaks = at[np.argsort(self._largest_rates(at))[-8:]]
-        around = (peaks[:, None] + np.linspace(-step, step, 41)).ravel() % self.clock.period
-        return float(self._largest_rates(np.sort(around)).max())
+        """Largest joint rate at the nodes of the cycle and between them, and once more in the cells where it is
+        largest; PEAK_MARGIN is for what this may be off."""
 
-    def _largest_rates(self, local: Array) -> Array:
-        position, speed, _ = self.clock.position(local)
-        return _largest_speeds(self._shape, position) * speed
+        def largest(begin: Array, width: Array, parts: Array) -> Array:
+            position = (begin[:, None] + width[:, None] * parts).ravel()
+            speeds = self._speeds(position, self.waves, sides=True)
+            return np.asarray((speeds * self.clock.speed(position)).reshape(-1, parts.size).max(axis=1))
+
+        nodes = self._nodes(self.waves)
+        begin, width = nodes[:-1], np.diff(nodes)
+        found = largest(begin, width, np.array([1e-3, 0.5, 1.0 - 1e-3]))
+        cells = np.sort(np.argsort(found)[-8:])
+        return float(max(found.max(), largest(begin[cells], width[cells], np.linspace(0.0, 1.0, 41)).max()))
 
     def time_of(self, position: float) -> float:
         """Time in [0, period] at which the cycle is at a position in [0, span]."""
-        return self.clock.time(position)
+        return float(self.clock.time(position))
 
     def state(self, t: Array) -> CycleState:
         """The body at times t (S,) s, ascending, t >= 0."""
@@ -202,11 +219,12 @@ class ExtensionCycle:
     def windows(self, stages: Sequence[Window] | None = None) -> list[tuple[Window, int, float, float]]:
         """Every stage of every wave inside one cycle: (window, wave counted from the front, start, end) in s;
         ``stages`` of the sweep (default: all)."""
+        listed = self.sweep.windows if stages is None else stages
+        bounds = self._place([(w.start, w.end) for w in listed]).reshape(len(listed), 2)
         out = []
         for k in range(self.waves):
-            for w in self.sweep.windows if stages is None else stages:
-                a = max(self._place(w.start) - k * self.span, 0.0)
-                b = min(self._place(w.end) - k * self.span, self.span)
+            inside = np.clip(bounds - k * self.span, 0.0, self.span)
+            for w, (a, b) in zip(listed, self.clock.time(inside).tolist(), strict=True):
                 if b > a:
-                    out.append((w, k, self.time_of(a), self.time_of(b)))
+                    out.append((w, k, a, b))
         return sorted(out, key=lambda item: (item[2], item[1]))

@@ -46,6 +46,8 @@ class Sweep(Protocol):
     launch_end: float
     landing_start: float
     windows: tuple[Window, ...]
+    #: s where the angles at -u are s times those at u, read from the head; None where there is no such symmetry
+    reversal: float | None
 
     def at(self, u: Array) -> tuple[Array, Array, Array]:
         """Angles (S, n) and their first and second derivatives by u, for ascending u (S,)."""
@@ -202,6 +204,8 @@ class ExtensionSweep:
 
     def __init__(self, front: StretchingBody, back: StretchingBody, extension: float, sign: float = 1.0) -> None:
         self.front, self.back, self.sign = front, back, sign
+        same = np.array_equal(front.lengths, back.lengths) and front.lead == back.lead
+        self.reversal: float | None = sign if same else None
         total = self.total = front.stages.total
         grid = np.linspace(0.0, total, 257)
         extents = front.at(grid).extents[:, 0]
@@ -286,6 +290,7 @@ class LiteralSweep:
         self.front, self.contraction = front, contraction
         self.total = front.stages.total
         self.launch_end = self.landing_start = 0.0
+        self.reversal: float | None = None
         extents = front.at(np.array([0.0, self.total])).extents[:, 0]
         self.gain = float(extents[1] - extents[0])
         out = []
