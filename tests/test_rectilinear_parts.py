@@ -122,3 +122,22 @@ def test_robots_whose_parts_may_all_touch_have_none() -> None:
     assert InchingSnake.of(one, 3, None).parts is not None and InchingSnake.of(bare, 3, None).parts is None
     motion = planned(bare, bp.Rectilinear(lift=0.0))
     assert motion.facts["advance_per_cycle"] == pytest.approx(0.2, rel=1e-5), "a body without thickness folds flat"
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_parts_at_one_place_count_as_one(name: str) -> None:
+    """Left and right feet lie in each other in the plane: without one of them, all overlaps are as they were."""
+    robot = ROBOTS[name]()
+    snake_ = InchingSnake.of(robot, 3, None)
+    parts, rng = snake_.parts, np.random.default_rng(len(name))
+    assert parts is not None
+    merged = parts.merged()
+    places = {(int(k), *np.ravel(ends)) for k, ends in zip(parts.link, parts.ends, strict=True)}
+    assert len(merged.link) == len(places) <= len(parts.link)
+    assert (len(merged.link) < len(parts.link)) == (name in ("feet", "feet close by"))
+    assert (np.diff(merged.link) >= 0).all()
+    points, angles = rng.normal(0.0, 0.1, (200, 5, 2)), rng.uniform(-np.pi, np.pi, (200, 4))
+    points[..., 0] += np.linspace(0.0, 0.2, 5)
+    same = merged.overlaps(points, angles, snake_.tail), parts.overlaps(points, angles, snake_.tail)
+    np.testing.assert_array_equal(*same)
+    assert (same[0] > 0.0).any() and (same[0] < 0.0).any()

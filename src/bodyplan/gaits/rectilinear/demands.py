@@ -80,7 +80,7 @@ class Demands:
         if len(self.limits):
             limits = np.array(self.limits, dtype=np.float64)
         none = np.zeros(0, dtype=np.int64), np.zeros((0, 2, 2)), np.zeros((0, 0)), np.zeros((0, 0), dtype=bool)
-        parts = self.parts
+        parts = None if self.parts is None else self.parts.merged()
         link, ends, need, leg = none if parts is None else (parts.link, parts.ends, parts.need, parts.leg)
         lengths = np.concatenate([[self.tail], self.links, [0.0]])
         asked = self.margin is not None and self.balance is not None

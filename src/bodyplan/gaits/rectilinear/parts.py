@@ -61,6 +61,18 @@ class Parts:
         number = np.where((links > 0) & (links < len(columns)), (links - 1) // 2, -1 - links)
         return cls(links, ends, need, np.asarray(number[:, None] == number))
 
+    def merged(self) -> Parts:
+        """With parts that lie in each other in the plane as one, such as left and right feet. It is as far from others
+        as any of them must be, so that the largest overlaps are the same."""
+        at = np.column_stack([self.link, self.ends.reshape(len(self.link), 4)])
+        one, which = np.unique(at, axis=0, return_index=True, return_inverse=True)[1:]
+        order = np.argsort(one)  # in the order of links still
+        one, which = one[order], np.argsort(order)[which.ravel()]
+        need = np.zeros((len(one), len(one)))
+        i, j = which[:, None], which
+        np.maximum.at(need, (np.minimum(i, j), np.maximum(i, j)), self.need)
+        return Parts(self.link[one], self.ends[one], need, self.leg[np.ix_(one, one)])
+
     def overlaps(self, points: Array, angles: Array, tail: float) -> Array:
         """(..., 2) m: by how much two parts of one leg, and two parts of different legs, are nearer to each other than
         they must be; negative where all are clear, but not below minus the largest ``need``; minus infinity where the
