@@ -64,17 +64,26 @@ def _face(box: Contact, axis: int, side: float, ground: Terrain, position: Array
     offset[axis] += side * half[axis]
     centre = position[owner] + rotation[owner] @ offset
     spread = rotation[owner][:, :, others] * half[others]  # (k, 3, 2): half edges
+    edges = ground.field_box
     with np.errstate(all="ignore"):
         for _ in range(_LEVELS):
             if not len(owner):
                 break
             size = np.abs(spread).sum(axis=2)
-            highest = ground.field_bounds((centre - size)[:, :2], (centre + size)[:, :2]).z[1]
-            near = ~(highest < centre[:, 2] - size[:, 2]) & ~out[owner]
+            low, high = (centre - size)[:, :2], (centre + size)[:, :2]
+            bounds = ground.field_bounds(low, high)
+            near = ~(bounds.z[1] < centre[:, 2] - size[:, 2]) & ~out[owner]
+            near &= np.all((low <= edges[1]) & (high >= edges[0]), axis=1)  # no ground beyond its edges
             owner, centre, spread, size = owner[near], centre[near], spread[near], size[near]
-            inside = ground.field_jet(centre[:, 0], centre[:, 1])[0] >= centre[:, 2]
+            height, slope, _ = ground.field_jet(centre[:, 0], centre[:, 1])
+            here = np.all((centre[:, :2] >= edges[0]) & (centre[:, :2] <= edges[1]), axis=1)
+            inside = (height >= centre[:, 2]) & here
             out[owner[inside]] = True
-            keep = ~out[owner] & (size.max(axis=1, initial=0.0) > SMALL)
+            # bounds of the height do not get narrower within a cell of a map: slope and bounds of the bend do
+            bend = np.abs(bounds.hessian[:, near]).max(axis=0)
+            falls = np.abs(spread[:, 2] - np.einsum("ki,kij->kj", slope, spread[:, :2])).sum(axis=1)
+            falls += 0.5 * np.einsum("ki,kij,kj->k", size[:, :2], bend, size[:, :2])
+            keep = ~out[owner] & (size.max(axis=1, initial=0.0) > SMALL) & ~(centre[:, 2] - height > falls)
             owner, centre, spread = owner[keep], centre[keep], 0.5 * spread[keep]
             signs = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
             centre = (centre[:, None] + np.einsum("kij,sj->ksi", spread, signs)).reshape(-1, 3)
