@@ -16,8 +16,9 @@ from bodyplan.gaits.carry.contact import Contacts
 from bodyplan.gaits.carry.heights import height_of
 from bodyplan.gaits.carry.holding import hold, holding_claims, holding_facts, holding_notes, judged
 from bodyplan.gaits.carry.pose import WheelContact, planes_of, wheel_contact
-from bodyplan.gaits.carry.rates import Rates, rates, rolling
+from bodyplan.gaits.carry.rates import Rates, rates
 from bodyplan.gaits.carry.report import claims, facts, notes
+from bodyplan.gaits.carry.spins import Hubs
 from bodyplan.gaits.carry.terrain import Terrain, terrain
 from bodyplan.gaits.carry.verdict import judge
 from bodyplan.gaits.carry.wheels import Wheels
@@ -29,11 +30,8 @@ from bodyplan.robot.model import Robot
 if TYPE_CHECKING:
     from bodyplan.gaits.carry.gait import Carry
 
-#: s of one step of the integral of a hub's spin, and how many there are at most between the samples
-STEP, MOST_STEPS = 0.02, 50_000
 #: m/rad: an adjusting joint next to its singular end q = 0, where the radius has no slope
 FLAT = 1e-9
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True)
@@ -144,21 +142,7 @@ def _unwrapped(angle: Array, scale: float) -> Array:
 
 
 def spin(wheels: Wheels, land: Terrain, at: Callable[[Array], Carriage], t: Array, rolled: Rolled) -> None:
-    """The hubs' turns since t = 0 into ``rolled.q``: their spins integrated by Gauss's formula between the times.
-    Where a wheel does not touch it does not turn."""
-    edges = np.concatenate([[0.0], t])
-    step = max(STEP, float(t[-1]) / MOST_STEPS)
-    counts = np.maximum(np.ceil(np.diff(edges) / step * (1.0 - 1e-9)), 1.0).astype(np.int64)
-    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges, edges[1:], counts, strict=False)]
-    parts = np.concatenate([*spans, edges[-1:]])
-    half = 0.5 * np.diff(parts)
-    nodes = parts[:-1, None] + half[:, None] * (1.0 + _NODES)
-    body = at(nodes.ravel())
-    found = contact.find(land, planes_of(wheels, body.position, body.turn.matrix))
-    speeds = rolling(found, body.carried(wheels))
-    last = np.cumsum(counts) - 1
-    for k, wheel in enumerate(wheels):
-        speed = speeds[k * nodes.size : (k + 1) * nodes.size]
-        touching = found.outcome[k * nodes.size : (k + 1) * nodes.size] == contact.TOUCHES
-        speed = np.where(touching & np.isfinite(speed), speed, 0.0).reshape(nodes.shape)
-        rolled.q[:, wheel.spin] = np.cumsum((speed @ _WEIGHTS) * half)[last] / wheel.turn
+    """The hubs' turns since t = 0 into ``rolled.q``."""
+    columns, signs = [wheel.spin for wheel in wheels], np.array([wheel.turn for wheel in wheels])
+    speeds, gains = rolled.qd[:, columns] * signs, rolled.qdd[:, columns] * signs
+    rolled.q[:, columns] = Hubs(wheels, land, at).turned(t, speeds, gains) / signs

@@ -41,6 +41,10 @@ class Carried:
     down: Array
     axle: Array
 
+    def take(self, index: IntArray) -> Carried:
+        """Some of the wheels, (k,)."""
+        return Carried(*(getattr(self, f.name)[index] for f in fields(Carried)))
+
 
 @dataclass(frozen=True)
 class Rates:

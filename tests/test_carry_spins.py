@@ -1,0 +1,105 @@
+"""Angles of hubs: speeds integrated in panels that are halved where they must be, against closed forms, finer times."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import bodyplan as bp
+from bodyplan.arrays import Array, IntArray
+from bodyplan.gaits.carry.spins import HALVINGS, PANEL, Hubs
+from bodyplan.gaits.carry.terrain import terrain
+from bodyplan.gaits.carry.wheels import Wheels
+from bodyplan.missions import load_mission
+
+ROBOT = bp.tri_wheel()
+Formula = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Given(Hubs):
+    """Hubs whose speeds are formulas, not a body's: the k-th one's is ``scales[k]`` times ``speed``."""
+
+    speed: Formula = np.sin
+    rate: Formula = np.cos
+    scales: tuple[float, ...] = (1.0, -2.0, 0.5)
+
+    def speeds(self, wheel: IntArray, when: Array) -> Array:
+        return self.moving(wheel, when)[0]
+
+    def moving(self, wheel: IntArray, when: Array) -> tuple[Array, Array]:
+        scale = np.asarray(self.scales)[wheel]
+        asked.append(len(when))
+        return scale * self.speed(when), scale * self.rate(when)
+
+    def turns(self, t: Array) -> Array:
+        asked.clear()
+        scale = np.asarray(self.scales)
+        return self.turned(t, self.speed(t)[:, None] * scale, self.rate(t)[:, None] * scale)
+
+
+#: numbers of speeds that the last ``turns`` asked for
+asked: list[int] = []
+
+
+def given(speed: Formula, rate: Formula) -> Given:
+    wheels = Wheels.of(ROBOT)
+    return Given(wheels, terrain(bp.Plane()), lambda t: pytest.fail("no body"), speed, rate)
+
+
+@pytest.mark.parametrize("t", [np.arange(0.0, 5.0, 0.047), np.array([0.0]), np.array([2.0, 2.0, 7.0]), np.array([0.3])])
+def test_smooth_speeds_to_rounding_without_halving(t: Array) -> None:
+    hubs = given(lambda s: 3.0 + np.sin(2.0 * s), lambda s: 2.0 * np.cos(2.0 * s))
+    exact = 3.0 * t + 0.5 * (1.0 - np.cos(2.0 * t))
+    np.testing.assert_allclose(hubs.turns(t), exact[:, None] * hubs.scales, rtol=1e-14, atol=1e-13)
+    assert len(asked) <= 2  # inner ends and nodes
+
+
+@pytest.mark.parametrize("power", [1, 2, 3, 4])
+def test_speeds_that_bend(power: int) -> None:
+    """max(0, s - c)^power bends at c, in the middle of nowhere."""
+    t, rng = np.arange(0.0, 2.0, 0.047), np.random.default_rng(5)
+    for c in rng.uniform(0.1, 1.9, 20):
+        hubs = given(
+            lambda s, c=c: np.maximum(0.0, s - c) ** power,
+            lambda s, c=c: power * np.where(s > c, s - c, 0.0) ** (power - 1) * (s > c),
+        )
+        exact = np.maximum(0.0, t - c) ** (power + 1) / (power + 1)
+        # the shortest panel leaves a share of the bend's own integral over it
+        shortest = 0.047 / 2**HALVINGS
+        atol = 1e-11 + 0.2 * shortest ** (power + 1)
+        np.testing.assert_allclose(hubs.turns(t), exact[:, None] * hubs.scales, atol=atol)
+        assert sum(asked) < 3 * (4 * len(t) + 9 * (HALVINGS + 1))  # only next to c
+
+
+def test_speeds_that_jump() -> None:
+    """A jump by 1 rad/s: off by less than it is over a quarter of the shortest panel; without halving by eight times
+    as much."""
+    t, rng, worst = np.arange(0.0, 2.0, 0.047), np.random.default_rng(6), 0.0
+    for c in rng.uniform(0.1, 1.9, 50):
+        hubs = given(lambda s, c=c: 1.0 * (s > c), lambda s: 0.0 * s)
+        worst = max(worst, np.abs(hubs.turns(t)[:, 0] - np.maximum(0.0, t - c)).max())
+        assert len(asked) == 1 + HALVINGS
+    assert worst < 0.25 * PANEL / 2**HALVINGS
+
+
+@pytest.mark.parametrize("name", ["carry-ramp", "carry-bump"])
+def test_seams_of_paths_between_the_times(name: str) -> None:
+    """The ease-in of a path ends within a panel: as exact as with times that leave no panel to speak of."""
+    mission = load_mission(name)
+    t = np.arange(0.0, 4.0, 0.047)
+    fine = np.linspace(0.0, t[-1], 20 * (len(t) - 1) + 1)
+    motion, finer = (bp.plan(mission.robot, mission.gait, mission.ground, times) for times in (t, fine))
+    np.testing.assert_allclose(motion.q, finer.q[::20], atol=1e-10)
+
+
+def test_contacts_that_jump_on_a_map() -> None:
+    """A rover on rubble: contacts jump between stones, and the angles agree with ones in shorter panels."""
+    mission = load_mission("carry-dem")
+    t = np.arange(0.0, 5.0, 0.05)
+    fine = np.linspace(0.0, t[-1], 20 * (len(t) - 1) + 1)
+    motion, finer = (bp.plan(mission.robot, mission.gait, mission.ground, times) for times in (t, fine))
+    columns = [motion.robot.joint_index(f"{name}.spin") for name in ("fl", "fr", "r")]
+    off = motion.q[:, columns] - finer.q[::20, columns]
+    assert np.abs(off).max() < 1e-3
