@@ -16,6 +16,9 @@ NORM, GAIN, RATIO = 0, 1, 2
 NOTHING_LEFT = 3e-16
 #: forces and multipliers beyond this are those of a solver that went astray
 ENDLESS = 1e12
+#: condition number (Frobenius) up to which steps that are held back come from the normal equations: right to 1e-8 of
+#: themselves, which the next step of Newton's method mends
+WELL = 1e4
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -179,6 +182,72 @@ def solved(matrix: Array, right: Array, out: Array) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def factored(normal: Array, damping: float, lower: Array) -> bool:
+    """Into ``lower`` (n, n) Cholesky's factor of ``normal`` (n, n) + ``damping`` 1; False where there is none."""
+    n = len(normal)
+    for j in range(n):
+        for i in range(j, n):
+            value = normal[i, j] + (damping if i == j else 0.0)
+            for c in range(j):
+                value -= lower[i, c] * lower[j, c]
+            if i > j:
+                lower[i, j] = value / lower[j, j]
+            elif value > 0.0:
+                lower[j, j] = math.sqrt(value)
+            else:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def well_conditioned(jacobian: Array, normal: Array, lower: Array) -> bool:
+    """Into ``normal`` (n, n) J^T J of a ``jacobian`` J (n, n); whether |J| |J^-1| <= WELL in Frobenius's norm, which
+    bounds the condition number from above. ``lower`` (n, n) is room."""
+    n = len(jacobian)
+    size = 0.0
+    for i in range(n):
+        for j in range(i + 1):
+            value = 0.0
+            for c in range(n):
+                value += jacobian[c, i] * jacobian[c, j]
+            normal[i, j] = value
+        size += normal[i, i]
+    if not factored(normal, 0.0, lower):
+        return False
+    # |J^-1| is the norm of the inverse factor, column by column
+    inverse, column = 0.0, np.empty(n)
+    for j in range(n):
+        for i in range(j, n):
+            value = 1.0 if i == j else 0.0
+            for c in range(j, i):
+                value -= lower[i, c] * column[c]
+            column[i] = value / lower[i, i]
+            inverse += column[i] * column[i]
+    return size * inverse <= WELL * WELL
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def held_back(jacobian: Array, rest: Array, normal: Array, damping: float, lower: Array, step: Array) -> bool:
+    """Into ``step`` (n,) the solution of (J^T J + damping 1) step = -J^T rest, with J^T J in ``normal``."""
+    n = len(rest)
+    if not factored(normal, damping, lower):
+        return False
+    for i in range(n):
+        value = 0.0
+        for c in range(n):
+            value -= jacobian[c, i] * rest[c]
+        for c in range(i):
+            value -= lower[i, c] * step[c]
+        step[i] = value / lower[i, i]
+    for i in range(n - 1, -1, -1):
+        value = step[i]
+        for c in range(i + 1, n):
+            value -= lower[c, i] * step[c]
+        step[i] = value / lower[i, i]
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def newton(
     which: int,
     A: Array,
@@ -207,20 +276,29 @@ def newton(
     tried_rest, tried_jacobian, tried_near = np.empty(n), np.empty((n, n)), np.empty_like(near)
     next_rest, next_jacobian, next_near = np.empty(n), np.empty((n, n)), np.empty_like(near)
     step, trial, following = np.empty(n), np.empty(n), np.empty(n)
+    normal, lower = np.empty((n, n)), np.empty((n, n))
     best = conditions(which, A, b, kind, mu, ray, gain, slope, u, rest, jacobian, near)
     for _ in range(steps):
         if best <= NOTHING_LEFT or not np.all(np.isfinite(jacobian)):
             break
         before = best
         U, s, V = jacobian, rest, jacobian
+        well = False
         for attempt in range(5):
+            damping = 0.0 if attempt <= 1 else before ** (0.5 ** (attempt - 2))
             if attempt == 0:
                 if not solved(jacobian, -rest, step):
+                    continue
+            elif attempt == 1 and well_conditioned(jacobian, normal, lower):
+                # nothing is to be left out: the step is that of the first attempt
+                well = True
+                continue
+            elif well:
+                if not held_back(jacobian, rest, normal, damping * damping, lower, step):
                     continue
             else:
                 if attempt == 1:
                     U, s, V = np.linalg.svd(jacobian)
-                damping = 0.0 if attempt == 1 else before ** (0.5 ** (attempt - 2))
                 step[:] = 0.0
                 for j in range(n):
                     if attempt > 1 or s[j] > 1e-13 * s[0]:
