@@ -126,9 +126,10 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
             push(_moved(before, offers, names[before.phase], len(groups)), offers)
         return state
 
+    cell = breadth.alike * link
+
     def stance(state: _State) -> tuple[int, ...]:
-        at = np.round(state.anchors[:, 0] / (breadth.alike * link)).astype(int)
-        return state.phase, *at.tolist()
+        return state.phase, *[round(x / cell) for x in state.anchors[:, 0].tolist()]
 
     best_start = best.far
     push(best)
@@ -138,25 +139,27 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
         phase = min((k for k, heap in enumerate(heaps) if heap), key=lambda k: heaps[k][0][0])
         first = heaps[phase][0][0]
         batch: list[_State] = []
-        alike: list[_State] = []
-        taken: dict[_State, tuple[int, float]] = {}
+        alike: list[tuple[_State, tuple[int, ...]]] = []
+        taken: dict[_State, tuple[tuple[int, ...], tuple[int, float]]] = {}
         while heaps[phase] and len(batch) < breadth.batch and heaps[phase][0][0] <= first + NEAR:
             state = pop(phase)
-            made, far = known = seen.get(stance(state), none)
+            at = stance(state)
+            made, far = known = seen.get(at, none)
             if state.made >= made and state.far <= far + STEP * link:
-                alike.append(state)
+                alike.append((state, at))
                 continue
-            seen[stance(state)], taken[state] = (min(made, state.made), max(far, state.far)), known
+            seen[at], taken[state] = (min(made, state.made), max(far, state.far)), (at, known)
             batch.append(state)
         expanded += len(batch)
         batch = _sound(walker, [s for s in batch if not wrong or not wrong.intersection(_line(s))])
         # those alike get their turn where the one that stood for them does not go
         left = set(taken).difference(batch)
         for state in reversed([s for s in taken if s in left]):
-            seen[stance(state)] = taken[state]
-        free = {stance(s) for s in left}
-        for state in alike:
-            if stance(state) in free:
+            at, known = taken[state]
+            seen[at] = known
+        free = {taken[s][0] for s in left}
+        for state, at in alike:
+            if at in free:
                 push(state)
         if not batch:
             continue
@@ -186,8 +189,8 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
     ground, reach = (Status.BELOW_FLOOR, Status.ABOVE_CEILING), Status.OUT_OF_REACH
     told = sorted(why.most_common(), key=lambda item: (item[0][1] not in ground, item[0][1] == reach))
     name, status = told[0][0] if told else (names[0], Status.OUT_OF_REACH)
-    at = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.anchors[:, 0])} m"
-    return _way(line, status, f"No landing spot leads on {at}: {name}: {status}", expanded)
+    where = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.anchors[:, 0])} m"
+    return _way(line, status, f"No landing spot leads on {where}: {name}: {status}", expanded)
 
 
 def _way(line: list[_State], status: Status, reason: str, tried: int) -> Way:
