@@ -204,3 +204,20 @@ def test_refusals(make, words) -> None:  # type: ignore[no-untyped-def]
         make()
     for word in words:
         assert word in str(raised.value)
+
+
+def test_parameters_of_arc_lengths() -> None:
+    """Random curves, also with bends as sharp as chance has it: the length up to the parameter is the one asked for."""
+    rng = np.random.default_rng(11)
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    for _ in range(40):
+        curve = Through(rng.normal(size=(rng.integers(3, 12), 2)), closed=bool(rng.integers(2)))
+        ends, sums, _ = curve._lengths
+        s = np.concatenate([rng.uniform(0.0, sums[-1], 100), sums])
+        u = curve._parameter(s)
+        k = np.clip(np.searchsorted(sums, s, side="right") - 1, 0, len(ends) - 2)
+        half = 0.5 * (u - ends[k])
+        at = ends[k][:, None] + half[:, None] * (1.0 + nodes)
+        made = sums[k] + (np.linalg.norm(curve._spline(at, 1), axis=-1) @ weights) * half
+        np.testing.assert_allclose(made, s, atol=1e-11 * sums[-1])
+        np.testing.assert_allclose(u[100:], ends, atol=1e-10 * ends[-1])

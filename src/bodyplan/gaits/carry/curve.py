@@ -61,8 +61,8 @@ class Through(Path):
         return make_interp_spline(self._knots, self._ring, k=degree, bc_type="periodic" if self._closed else None)
 
     @cached_property
-    def _lengths(self) -> tuple[Array, Array]:
-        """Parameters, and the arc length up to each."""
+    def _lengths(self) -> tuple[Array, Array, Array]:
+        """Parameters, the arc length up to each, and its slope by the parameter there."""
         ends = np.concatenate(
             [np.linspace(a, b, PIECES, endpoint=False) for a, b in zip(self._knots, self._knots[1:], strict=False)]
             + [self._knots[-1:]]
@@ -70,7 +70,8 @@ class Through(Path):
         half = 0.5 * np.diff(ends)
         at = ends[:-1, None] + half[:, None] * (1.0 + _NODES)
         speed = np.linalg.norm(self._spline(at, 1), axis=-1)
-        return ends, np.concatenate([[0.0], np.cumsum((speed @ _WEIGHTS) * half)])
+        sums = np.concatenate([[0.0], np.cumsum((speed @ _WEIGHTS) * half)])
+        return ends, sums, np.linalg.norm(self._spline(ends, 1), axis=-1)
 
     def at(self, t: Array, way: Function) -> Course:
         """The course at t (T,) s; an open curve stays at its end."""
@@ -92,18 +93,26 @@ class Through(Path):
     def _parameter(self, s: Array) -> Array:
         """The spline's parameter at arc lengths s (T,): Newton, each step with the arc length from the last known
         end."""
-        ends, sums = self._lengths
+        ends, sums, slopes = self._lengths
         k = np.clip(np.searchsorted(sums, s, side="right") - 1, 0, len(ends) - 2)
         a, b = ends[k], ends[k + 1]
-        u = a + (b - a) * (s - sums[k]) / (sums[k + 1] - sums[k])
+        # from the cubic of the inverse with its values and slopes at both ends
+        size = sums[k + 1] - sums[k]
+        share = (s - sums[k]) / size
+        other = 1.0 - share
+        u = a + (b - a) * share**2 * (3.0 - 2.0 * share)
+        u = np.clip(u + share * other * size * (other / slopes[k] - share / slopes[k + 1]), a, b)
+        before, enough = np.zeros(len(s)), 1e-14 * ends[-1]
         for _ in range(8):
             half = 0.5 * (u - a)
             nodes = a[:, None] + half[:, None] * (1.0 + _NODES)
             made = sums[k] + (np.linalg.norm(self._spline(nodes, 1), axis=-1) @ _WEIGHTS) * half
             step = (s - made) / np.linalg.norm(self._spline(u, 1), axis=1)
-            u = np.clip(u + step, a, b)
-            if np.all(np.abs(step) <= 1e-14 * ends[-1]):
+            u, step = np.clip(u + step, a, b), np.abs(step)
+            # steps go with the square of the one before: the next one is about step (step / before)^2
+            if np.all((step <= enough) | (step**3 <= 1e-4 * enough * before**2)):
                 break
+            before = step
         return u
 
     def to_dict(self) -> dict[str, Any]:
