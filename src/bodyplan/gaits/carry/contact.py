@@ -22,7 +22,7 @@ RESIDUAL = 1e-11
 #: wheels looked at in one go
 CHUNK = 8192
 #: wheels on a height map from which on threads share the kernels' work
-THREADED = 4096
+THREADED = 2048
 
 
 @dataclass(frozen=True)

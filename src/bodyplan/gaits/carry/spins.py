@@ -163,8 +163,10 @@ def _edges(t: Array) -> tuple[Array, IntArray]:
     times = np.concatenate([[0.0], t]) if t[0] != 0.0 else t
     longest = max(PANEL, float(t[-1]) / MOST_PANELS)
     counts = np.maximum(np.ceil(np.abs(np.diff(times)) / longest * (1.0 - 1e-9)), 1.0).astype(np.int64)
-    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(times, times[1:], counts, strict=False)]
-    return np.concatenate([*spans, times[-1:]]), np.repeat(np.arange(len(t) - len(counts), len(t)), counts)
+    which = np.repeat(np.arange(len(counts)), counts)
+    part = np.arange(len(which)) - (np.cumsum(counts) - counts)[which]
+    starts = times[which] + part * (np.diff(times) / counts)[which]
+    return np.append(starts, times[-1]), which + len(t) - len(counts)
 
 
 def _finite(values: Array, sure: BoolArray | bool = True) -> Array:
