@@ -10,12 +10,16 @@ import numpy as np
 import pytest
 
 import bodyplan as bp
+from bodyplan.gaits.rectilinear import course
+from bodyplan.gaits.rectilinear.search import Way, search
 from bodyplan.gaits.rectilinear.snake import InchingSnake
+from bodyplan.gaits.rectilinear.track import Track
 from rectilinear_cases import OPTIONS, TIPS, failures, unit_ends
 
 BODY, FOOT = 0.008, 0.01
 ROBOT = bp.snake(10, 0.1, **OPTIONS, radius=BODY, foot_radius=FOOT, foot_spread=0.06)
 FIVE = bp.snake(18, 0.1, **OPTIONS, radius=BODY, foot_radius=FOOT, foot_spread=0.06)
+THIN_FIVE = bp.snake(18, 0.1, axes="alternating", first="pitch", foot_radius=0.003, foot_spread=0.06, mass=0.125)
 Steps = list[tuple[float, float]]
 #: m that a clearance may fall short of between the places at which a move is tried
 BETWEEN = 2e-4
@@ -211,6 +215,35 @@ def test_where_it_cannot_begin() -> None:
         assert motion.status[0] != "ok" and len(set(motion.status)) == 1
         assert any("where it begins the snake cannot stand" in note for note in motion.notes)
         assert np.isfinite(motion.q).all() and np.all(motion.qd == 0.0)
+
+
+def test_where_one_search_finds_no_way_another_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Up and down stairs under a roof: by chance some spacings miss all ways with the stances that are tried first.
+    What searches without a way would have told of it changes nothing."""
+    floor = [(-np.inf, 0.0), (2.2, 0.04), (3.0, 0.08), (3.8, 0.04)]
+    ground = bp.Profile(floor, [(-np.inf, 0.22), (2.0, 0.26), (2.8, 0.3), (4.2, 0.26)])
+    snake = InchingSnake.of(THIN_FIVE, 5, None)
+    searches = []
+    for spacing in ((1.0, 1.0, 1.0, 1.0), (0.998, 1.0, 1.0, 1.0), (1.0, 0.996, 1.0, 1.0)):
+        gait = bp.Rectilinear(anchors=5, schedule="two-phase", lift=0.05, spacing=spacing, move_time=1.0)
+        found = []
+        for told in (False, True):
+            ways: list[Way] = []
+
+            def counted(*args: Any, partly: bool, told: bool = told, ways: list[Way] = ways) -> Way:
+                ways.append(search(*args, partly=partly or told))
+                return ways[-1]
+
+            monkeypatch.setattr(course, "search", counted)
+            found.append(course.course_of(gait, snake, Track.of(ground, gait.start, gait.heading), 24.0))
+            searches.append(len(ways))
+            assert all(bool(way.moves) == bool(told or way.status == "ok") for way in ways)
+        one, other = (sequence.moves for sequence in found)
+        assert found[0].status == "ok" and len(one) == 24
+        assert float((one.after[-1] - one.before[0])[:, 0].mean()) > 3.5
+        for name in ("before", "after", "lift", "early"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert searches[0::2] == searches[1::2] and max(searches) > 1
 
 
 def test_cycles_end_and_clearance_is_the_user_s() -> None:

@@ -256,7 +256,7 @@ def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: floa
     tried, far = 0, wanted * pace
     ways: list[Way] = []
     for each, breadth in [*product(walkers, NARROW), *product(walkers, [WIDE])]:
-        way = search(each, start, schedule, wanted, pace, breadth)
+        way = search(each, start, schedule, wanted, pace, breadth, partly=breadth is WIDE)
         tried += way.tried
         share = (way.far - float(start[:, 0].mean())) / far if far > 0.0 else 1.0
         if way.status == Status.OK and share >= BRISK:

@@ -96,13 +96,16 @@ class Way:
         return float(self.moves[-1].after[0, :, 0].mean()) if self.moves else -np.inf
 
 
-def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, breadth: Breadth = WIDE) -> Way:
+def search(
+    walker: Walker, start: Array, schedule: str, most: int, pace: float, breadth: Breadth = WIDE, partly: bool = True
+) -> Way:
     """The way over the steps from anchors ``start`` (N, 2) in ``most`` moves; ``pace`` m a move is that over level
     ground.
 
     Best first: the state that has come farthest for its number of moves, which counts little, is tried next. Where it
     has no way on, those behind it get their turn. Of where a move can land the farthest is found at once, what lies
-    behind it only when its turn comes: few of those are ever tried.
+    behind it only when its turn comes: few of those are ever tried. Of a way that does not go on all its moves are told
+    with the reason; without ``partly`` none.
     """
     groups, names = phases(len(start), schedule), move_names(len(start), schedule)
     link = float(walker.snake.links.mean())
@@ -179,6 +182,8 @@ def search(walker: Walker, start: Array, schedule: str, most: int, pace: float, 
             push(_State(state.anchors, *state.then(len(groups)), state.made, state.held + stuck, state))
             if not stuck:
                 push(_moved(state, offers, names[phase], len(groups)), offers)
+    if not partly:
+        return _way([], Status.OUT_OF_REACH, "", expanded)
     line = _mended(walker, best)
     best = line[-1]
     why: Why = Counter()
