@@ -6,30 +6,20 @@ the shape parameters change, so that the fit can differentiate exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import cos, pi, sin, sqrt
-from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.curves.dynamic import crossing_of, dynamic_jet, dynamic_value
-
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+from bodyplan.kernels import lean
 
 START, KIND, ORIGIN, V, VD, VDD, G, GD, GDD = range(9)
 COLUMNS = 9
 TAIL, MODULE, FLAT = 0.0, 1.0, 2.0
 CUT, PRODUCT, NATURAL = 0, 1, 2
 RULES = {"cut": CUT, "product": PRODUCT, "natural": NATURAL}
-
-
-def lean(kernel: Kernel) -> Kernel:
-    """``njit`` for kernels that make no arrays: they do without Numba's counts of references (as its own sorts do),
-    which take longer than the arithmetic of a short kernel. Assigning an array to a slice makes one."""
-    compiled: Any = njit
-    return cast(Kernel, compiled(cache=True, _nrt=False)(kernel))
 
 
 @lean

@@ -6,9 +6,6 @@ Other kernels call :func:`tape_jet`, :func:`tape_bounds` and :func:`tape_range`,
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
 import numpy as np
 from numba import njit
 
@@ -43,20 +40,13 @@ from bodyplan.expressions.compiled import (
     TANH,
     Tape,
 )
-
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+from bodyplan.kernels import lean
 
 #: more than the number of any node
 _NONE = 1 << 30
 
 
-def _lean(kernel: Kernel) -> Kernel:
-    """``njit`` for kernels that make no arrays: they do without Numba's counts of references."""
-    compiled: Any = njit
-    return cast(Kernel, compiled(cache=True, nogil=True, error_model="numpy", _nrt=False)(kernel))
-
-
-@_lean
+@lean
 def tape_jet(tape: Tape, x: float, y: float, room: Array, out: Array) -> None:
     """Of a formula of x and y at one place: value, slopes along x and y, second derivatives xx, xy, yy into ``out``
     (6+,); the value is nan where the formula is undefined or the place not finite. ``tape``: of
@@ -74,7 +64,7 @@ def tape_jet(tape: Tape, x: float, y: float, room: Array, out: Array) -> None:
         out[0] = np.nan
 
 
-@_lean
+@lean
 def tape_bounds(tape: Tape, low_x: float, low_y: float, high_x: float, high_y: float, room: Array, out: Array) -> None:
     """Of a formula of x and y over one box, as :meth:`bodyplan.expressions.Expression.enclosure`: lowest and highest
     value, second derivatives xx, xy, yy, and inf (nothing is known of third ones) into ``out`` (9,), or slopes along x
@@ -93,7 +83,7 @@ def tape_bounds(tape: Tape, low_x: float, low_y: float, high_x: float, high_y: f
         out[11], out[12] = _wider(room, tape.outputs[2])
 
 
-@_lean
+@lean
 def tape_slopes(tape: Tape, room: Array) -> tuple[float, float, float, float]:
     """Lowest and highest slope along x, then along y, over the box of the last :func:`tape_bounds` in ``room``."""
     low_x, high_x = _wider(room, tape.outputs[1])
@@ -101,7 +91,7 @@ def tape_slopes(tape: Tape, room: Array) -> tuple[float, float, float, float]:
     return low_x, high_x, low_y, high_y
 
 
-@_lean
+@lean
 def tape_range(
     tape: Tape, low_x: float, low_y: float, high_x: float, high_y: float, room: Array
 ) -> tuple[float, float]:
@@ -150,7 +140,7 @@ def tape_intervals(tape: Tape, low: Array, high: Array, value: Array, gradient: 
             hessian[0, k, i], hessian[1, k, i] = _wider(room, tape.outputs[1 + first + i])
 
 
-@_lean
+@lean
 def run_numbers(code: IntArray, registers: Array) -> int:
     """Fill the registers of all instructions; the least number of a node whose value is not finite, or more than
     any."""
@@ -210,7 +200,7 @@ def run_numbers(code: IntArray, registers: Array) -> int:
     return culprit
 
 
-@_lean
+@lean
 def run_intervals(code: IntArray, registers: Array) -> bool:
     """Fill the registers (r, 2) of all instructions; whether the formula is defined nowhere in the box."""
     start, empty = len(registers) - len(code), False
@@ -295,7 +285,7 @@ def run_intervals(code: IntArray, registers: Array) -> bool:
     return empty
 
 
-@_lean
+@lean
 def _wider(registers: Array, at: int) -> tuple[float, float]:
     """A register's interval, widened for rounding; infinite where nothing is known."""
     low, high = registers[at, 0], registers[at, 1]
@@ -304,7 +294,7 @@ def _wider(registers: Array, at: int) -> tuple[float, float]:
     return low, high
 
 
-@_lean
+@lean
 def _product(al: float, ah: float, bl: float, bh: float) -> tuple[float, float]:
     p, q, r, s = al * bl, al * bh, ah * bl, ah * bh
     if np.isnan(p + q + r + s) and (np.isnan(p) or np.isnan(q) or np.isnan(r) or np.isnan(s)):
@@ -312,25 +302,25 @@ def _product(al: float, ah: float, bl: float, bh: float) -> tuple[float, float]:
     return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
 
 
-@_lean
+@lean
 def _size(low: float, high: float) -> tuple[float, float]:
     p, q = abs(low), abs(high)
     return (0.0 if low <= 0.0 and high >= 0.0 else min(p, q)), max(p, q)
 
 
-@_lean
+@lean
 def _between(low: float, high: float, point: float, period: float) -> bool:
     """Whether point + k period lies between for a whole k (also where an end is infinite)."""
     return not np.floor((high - point) / period) - np.ceil((low - point) / period) < 0.0
 
 
-@_lean
+@lean
 def _meets_cut(y_low: float, y_high: float, x_low: float) -> bool:
     """Whether atan2 jumps (or is undefined) in the box: it contains a point with y = 0 and x <= 0."""
     return y_low <= 0.0 and y_high >= 0.0 and x_low <= 0.0
 
 
-@_lean
+@lean
 def _angles(yl: float, yh: float, xl: float, xh: float) -> tuple[float, float]:
     p, q, r, s = np.arctan2(yl, xl), np.arctan2(yl, xh), np.arctan2(yh, xl), np.arctan2(yh, xh)
     return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))

@@ -21,6 +21,7 @@ from bodyplan.arrays import Array, IntArray, TextArray, finite, whole
 from bodyplan.curves import pieces as pc
 from bodyplan.curves.concertina import GAUSS_NODES, GAUSS_WEIGHTS, ConcertinaCurve
 from bodyplan.errors import InputError, SolveError, Status
+from bodyplan.kernels import lean
 from bodyplan.threads import shared
 
 #: a link whose curve is longer than this many link lengths (half a circle over the link) skips a fold
@@ -63,7 +64,7 @@ class LinksFit:
         return self
 
 
-@pc.lean
+@lean
 def _bounds(pieces: Array, k: int, omega: float, y: float, slope: float) -> tuple[float, float]:
     """Bounds of |y'| and |y''| on the rest of a piece, from a point with the given y and slope on."""
     if pieces[k, pc.KIND] == pc.FLAT:
@@ -73,7 +74,7 @@ def _bounds(pieces: Array, k: int, omega: float, y: float, slope: float) -> tupl
     return energy, energy * omega * sqrt(1.0 + 4.0 * pieces[k, pc.G] * pieces[k, pc.G])
 
 
-@pc.lean
+@lean
 def next_joint(
     x0: float, y0: float, k: int, steepest: float, length: float, guess: float, pieces: Array, count: int, omega: float
 ) -> float:
@@ -122,7 +123,7 @@ def next_joint(
         k += 1
 
 
-@pc.lean
+@lean
 def _growing(
     x0: float,
     y0: float,
@@ -184,7 +185,7 @@ def _growing(
     return x
 
 
-@pc.lean
+@lean
 def _tight(
     a: float,
     b: float,
@@ -205,7 +206,7 @@ def _tight(
     return arc > TIGHT_ARC * length or (whole_fold and arc > FOLD_ARC * length)
 
 
-@pc.lean
+@lean
 def place_chain(
     first: int,
     step: float,
@@ -250,7 +251,7 @@ def place_chain(
     return tight
 
 
-@pc.lean
+@lean
 def chain_rates(first: int, points: Array, local: Array, pieces: Array, omega: float, rates: Array) -> None:
     """First and second derivative of the links' angles by the curve's progress t, (2, n), for joints that
     :func:`place_chain` put on the curve, of which those up to ``first`` rest (kernel); and local[:, 3:5], their speed
@@ -281,7 +282,7 @@ def chain_rates(first: int, points: Array, local: Array, pieces: Array, omega: f
         local[i + 1, 3], local[i + 1, 4] = xd, xdd
 
 
-@pc.lean
+@lean
 def _moving(
     j: int, points: Array, local: Array, pieces: Array, omega: float
 ) -> tuple[float, float, float, float, float]:

@@ -19,6 +19,7 @@ from bodyplan.arrays import Array, IntArray, frozen
 from bodyplan.curves import pieces as pc
 from bodyplan.curves.concertina import GAUSS_NODES, GAUSS_WEIGHTS, ConcertinaCurve
 from bodyplan.fitting.links import chain_rates, place_chain
+from bodyplan.kernels import lean
 
 BLENDS = {"linear": 0, "smooth": 1}
 
@@ -82,7 +83,7 @@ def stretching(
     return Stages(names, frozen(pair[0]), frozen(pair[1]), frozen(start), frozen(duration), blend)
 
 
-@pc.lean
+@lean
 def _ramps(s: float, initial: Array, final: Array, start: Array, duration: Array, blend: int, out: Array) -> None:
     """Parameters and their first two derivatives with respect to progress, out (p, 3)."""
     for i in range(initial.size):
@@ -155,7 +156,7 @@ def scratch_of(chain: Chain) -> Scratch:
     )
 
 
-@pc.lean
+@lean
 def body_at(s: float, chain: Chain, at: Scratch) -> tuple[float, float, float, int]:
     """One chain at one progress (kernel): fills ``at``; returns the extent along x with its two derivatives, and the
     first link that is too tight or -1."""

@@ -20,9 +20,9 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array
-from bodyplan.curves import pieces as pc
 from bodyplan.errors import InputError
 from bodyplan.gaits.stretching import Chain, Scratch, StretchingBody, body_at, scratch_of
+from bodyplan.kernels import lean
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def _progress_at(target: float, low: float, high: float, chain: Chain) -> float:
     return s
 
 
-@pc.lean
+@lean
 def _ahead(u: float, before: Array, last: Array) -> float:
     """s at u, from u, s, s' and s'' at one or two places before (kernel): the quintic through both, where the second
     is not much nearer to u than to the first; else a parabola."""
@@ -118,7 +118,7 @@ def _sweep(
     _along(u, launch, front, back, a, b, before, last, out)
 
 
-@pc.lean
+@lean
 def _along(
     u: Array,
     launch: tuple[float, float, float, float, float, float, float],

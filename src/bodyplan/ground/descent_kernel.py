@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 
 from bodyplan.arrays import Array
-from bodyplan.ground.field_kernel import GX, GY, HXX, HXY, HYY, JET, F, FieldArrays, Room, crease_at, jet_at, lean
+from bodyplan.ground.field_kernel import GX, GY, HXX, HXY, HYY, JET, F, FieldArrays, Room, crease_at, jet_at
+from bodyplan.kernels import lean
 
 _STEPS, _HALVINGS, _CREASE_STEPS = 60, 30, 30
 

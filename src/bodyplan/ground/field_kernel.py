@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.expressions import Expression
@@ -14,8 +13,7 @@ from bodyplan.expressions.compiled import INSIDE, Tape
 from bodyplan.expressions.tape_kernel import tape_bounds, tape_jet, tape_range
 from bodyplan.ground.spline import BicubicSpline
 from bodyplan.ground.spline_kernel import spline_at, spline_bounds
-
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+from bodyplan.kernels import lean
 
 #: columns of a jet: value, first and second derivatives
 F, GX, GY, HXX, HXY, HYY, JET = range(7)
@@ -23,13 +21,6 @@ F, GX, GY, HXX, HXY, HYY, JET = range(7)
 Z_LOW, Z_HIGH, XX, XY, YY, THIRD, BOUNDS = 0, 1, 2, 4, 6, 8, 9
 #: columns of a box that the search keeps: corners, lower bound of the distance, whether half its square is convex
 LOW_X, LOW_Y, HIGH_X, HIGH_Y, LEAST, CONVEX, BOX = range(7)
-
-
-def lean(kernel: Kernel) -> Kernel:
-    """``njit`` for kernels that make no arrays: they do without Numba's counts of references, which take longer than
-    the arithmetic of a short kernel."""
-    compiled: Any = njit
-    return cast(Kernel, compiled(cache=True, nogil=True, error_model="numpy", _nrt=False)(kernel))
 
 
 class SplineArrays(NamedTuple):

@@ -34,9 +34,9 @@ from bodyplan.ground.field_kernel import (
     Room,
     bounds_at,
     jet_at,
-    lean,
     top_over,
 )
+from bodyplan.kernels import lean
 
 #: relative error of the distance up to which the search proves that nothing is nearer
 TOLERANCE = 1e-11

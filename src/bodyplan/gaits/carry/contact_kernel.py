@@ -15,7 +15,8 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry.newton import BEST_CHI, BEST_RADIUS, CHI, GOES_ON, MERIT, MOST_STEPS, RADIUS, SETTLED, tried
 from bodyplan.gaits.carry.search_kernel import bent, nearest_on
 from bodyplan.gaits.carry.section_kernel import FIRST, FOUND, Room, W, farthest, foot_at
-from bodyplan.ground.field_kernel import GX, GY, HXX, HXY, HYY, FieldArrays, jet_at, lean
+from bodyplan.ground.field_kernel import GX, GY, HXX, HXY, HYY, FieldArrays, jet_at
+from bodyplan.kernels import lean
 
 #: outcomes
 TOUCHES, LIES_FLAT, NO_GROUND, AXLE_BELOW, UNPROVED, OFF_THE_MAP = range(6)

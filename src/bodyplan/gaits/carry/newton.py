@@ -22,7 +22,7 @@ from numba import njit
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry.planes import Planes
 from bodyplan.gaits.carry.terrain import Terrain
-from bodyplan.ground.field_kernel import lean
+from bodyplan.kernels import lean
 
 MOST_STEPS = 80
 #: m, as a share of how far from the origin: steps below it are rounding

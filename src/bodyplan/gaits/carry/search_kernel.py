@@ -28,7 +28,8 @@ from bodyplan.gaits.carry.section_kernel import (
     steepest_at,
     upright,
 )  # fmt: skip
-from bodyplan.ground.field_kernel import GX, GY, HXX, THIRD, XX, XY, YY, Z_HIGH, Z_LOW, FieldArrays, jet_at, lean
+from bodyplan.ground.field_kernel import GX, GY, HXX, THIRD, XX, XY, YY, Z_HIGH, Z_LOW, FieldArrays, jet_at
+from bodyplan.kernels import lean
 
 #: half the width of the first cell about a contact, as a share of its distance; the least one of those beside it, how
 #: much wider the next ones are, and the widest

@@ -15,7 +15,8 @@ import numpy as np
 from bodyplan.arrays import Array
 from bodyplan.expressions.tape_kernel import tape_range, tape_slopes
 from bodyplan.ground import field_kernel
-from bodyplan.ground.field_kernel import BOUNDS, GX, GY, HXX, HXY, HYY, JET, Z_HIGH, F, FieldArrays, jet_at, lean
+from bodyplan.ground.field_kernel import BOUNDS, GX, GY, HXX, HXY, HYY, JET, Z_HIGH, F, FieldArrays, jet_at
+from bodyplan.kernels import lean
 
 #: columns of a section (:class:`bodyplan.gaits.carry.planes.Section`), after those of the ground's jet
 W, FIRST, SECOND, STEEP, FOUND, COLUMNS = range(JET, JET + 6)

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.curves.pieces import lean
+from bodyplan.kernels import lean
 
 #: most steps of Newton, and after how many that do not halve the error it gives up; the error in m at which a foot is
 #: in place; the longest step of a joint (rad, or m)

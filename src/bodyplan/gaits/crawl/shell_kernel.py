@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, IntArray
-from bodyplan.curves.pieces import lean
+from bodyplan.kernels import lean
 from bodyplan.spatial.segments import apart, from_box
 
 

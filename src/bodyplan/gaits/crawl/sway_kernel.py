@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray
-from bodyplan.curves.pieces import lean
 from bodyplan.gaits.crawl.leg_kernel import Postures, Tables, chain, moment, placed, room, sides
+from bodyplan.kernels import lean
 from bodyplan.spatial.hulls import EDGE, edge_distance, edges_of
 
 #: smallest distance m from an edge whose logarithm is taken

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
-from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.parts import Parts
+from bodyplan.kernels import lean
 
 #: relative to the longest link, by how much more links keep from each other: far above rounding
 MORE = 1e-9

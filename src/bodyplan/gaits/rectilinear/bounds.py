@@ -10,10 +10,10 @@ from numba import njit
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.apart import Apart, all_apart
-from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.legs import elbow, leg_angles
 from bodyplan.gaits.rectilinear.moves import chord_of, swing_of
 from bodyplan.gaits.rectilinear.parts import overlap
+from bodyplan.kernels import lean
 
 #: what is demanded, in the order in which it is told; elbows and lifted anchors are highest at different places
 DEMANDS = (

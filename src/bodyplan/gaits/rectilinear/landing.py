@@ -9,8 +9,8 @@ from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, room_for
-from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Steps, highest, try_move
+from bodyplan.kernels import lean
 
 #: what is told of a spot where the anchor cannot stand, or where no swing leads to
 NO_STANCE, NO_SWING = -1, -2

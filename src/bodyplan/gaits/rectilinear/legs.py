@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.gaits.rectilinear.kernels import lean
+from bodyplan.kernels import lean
 
 #: relative slack of reach: a leg that is too short by less counts as straight
 REACH = 1e-12

@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.legs import REACH, Leg, leg_angles, leg_rates
 from bodyplan.gaits.rectilinear.swing import swing_rates, swung
+from bodyplan.kernels import lean
 
 
 @dataclass(frozen=True, eq=False)

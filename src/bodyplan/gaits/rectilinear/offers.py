@@ -9,9 +9,9 @@ from numba import njit
 
 from bodyplan.arrays import Array, IntArray
 from bodyplan.gaits.rectilinear.bounds import Bounds
-from bodyplan.gaits.rectilinear.kernels import lean
 from bodyplan.gaits.rectilinear.landing import Trial, swing_to, trial_of
 from bodyplan.gaits.rectilinear.terrain import Keeps, Steps, highest
+from bodyplan.kernels import lean
 
 #: what is not known of a spot before it is tried
 UNKNOWN = -3

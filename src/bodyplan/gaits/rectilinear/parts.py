@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
-from bodyplan.gaits.rectilinear.kernels import lean
+from bodyplan.kernels import lean
 from bodyplan.robot.model import Robot
 from bodyplan.robot.neighbours import separate_contacts
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bodyplan.arrays import Array
-from bodyplan.gaits.rectilinear.kernels import lean
+from bodyplan.kernels import lean
 
 PATHS = ("cycloid",)
 #: how long a step up that rises early waits before it goes along, as a share of what it is early by

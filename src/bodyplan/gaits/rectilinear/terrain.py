@@ -10,7 +10,7 @@ from numba import njit
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, excess, lay, room_for
-from bodyplan.gaits.rectilinear.kernels import lean
+from bodyplan.kernels import lean
 
 #: relative slack of a foot that stands
 STANDS = 1e-12

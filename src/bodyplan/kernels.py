@@ -1,4 +1,4 @@
-"""How the kernels of inching are compiled."""
+"""How small kernels are compiled."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
 def lean(kernel: Kernel) -> Kernel:
-    """``njit`` for kernels that make no arrays: they do without Numba's counts of references, which take longer than
-    the arithmetic of one pose, and without its tests for divisions by zero."""
+    """``njit`` for kernels that make no arrays: they do without Numba's counts of references (as its own sorts do),
+    which take longer than the arithmetic of a short kernel, and without its tests for divisions by zero, which give
+    inf or nan as in NumPy. Assigning an array to a slice makes one."""
     compiled: Any = njit
     return cast(Kernel, compiled(cache=True, nogil=True, error_model="numpy", _nrt=False)(kernel))
