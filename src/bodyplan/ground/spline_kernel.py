@@ -83,6 +83,34 @@ def spline_at(nodes: Array, dx: float, dy: float, x: float, y: float, basis: Arr
 
 
 @njit(cache=True, nogil=True)
+def blocks_over(
+    shape: tuple[int, int],
+    dx: float,
+    dy: float,
+    offsets: IntArray,
+    widths: IntArray,
+    low_x: float,
+    low_y: float,
+    high_x: float,
+    high_y: float,
+) -> tuple[int, int, int, int]:
+    """Columns of a spline's tables of bounds that together cover a box: four blocks, of which some may be one.
+    ``shape``: how many nodes there are in y and x."""
+    last_x, last_y = shape[1] - 2.0, shape[0] - 2.0
+    ax = int(min(max(np.floor(low_x / dx - 1e-9), 0.0), last_x))
+    ay = int(min(max(np.floor(low_y / dy - 1e-9), 0.0), last_y))
+    bx = int(min(max(np.floor(high_x / dx + 1e-9), 0.0), last_x))
+    by = int(min(max(np.floor(high_y / dy + 1e-9), 0.0), last_y))
+    # the level on which the box meets at most two blocks along each axis
+    span, level = max(bx - ax, by - ay), 0
+    while (1 << level) < span:
+        level += 1
+    ax, ay, bx, by = ax >> level, ay >> level, bx >> level, by >> level
+    lower, upper = offsets[level] + ay * widths[level], offsets[level] + by * widths[level]
+    return lower + ax, lower + bx, upper + ax, upper + bx
+
+
+@njit(cache=True, nogil=True)
 def spline_bounds(
     shape: tuple[int, int],
     dx: float,
@@ -98,19 +126,7 @@ def spline_bounds(
 ) -> None:
     """Of one box, as :meth:`bodyplan.ground.spline.BicubicSpline.bounds`: lowest and highest value, second derivatives
     xx, xy, yy, and a bound of the third ones, into ``out`` (9,). ``shape``: how many nodes there are in y and x."""
-    last_x, last_y = shape[1] - 2.0, shape[0] - 2.0
-    ax = int(min(max(np.floor(low_x / dx - 1e-9), 0.0), last_x))
-    ay = int(min(max(np.floor(low_y / dy - 1e-9), 0.0), last_y))
-    bx = int(min(max(np.floor(high_x / dx + 1e-9), 0.0), last_x))
-    by = int(min(max(np.floor(high_y / dy + 1e-9), 0.0), last_y))
-    # the level on which the box meets at most two blocks along each axis
-    span, level = max(bx - ax, by - ay), 0
-    while (1 << level) < span:
-        level += 1
-    ax, ay, bx, by = ax >> level, ay >> level, bx >> level, by >> level
-    start, width = offsets[level], widths[level]
-    one, two = start + ay * width + ax, start + ay * width + bx
-    three, four = start + by * width + ax, start + by * width + bx
+    one, two, three, four = blocks_over(shape, dx, dy, offsets, widths, low_x, low_y, high_x, high_y)
     for k in range(9):
         lowest = min(min(tables[k, one], tables[k, two]), min(tables[k, three], tables[k, four]))
         out[k] = lowest if k % 2 == 0 and k < 8 else -lowest

@@ -16,6 +16,7 @@ from bodyplan.arrays import Array
 from bodyplan.expressions.tape_kernel import tape_range, tape_slopes
 from bodyplan.ground import field_kernel
 from bodyplan.ground.field_kernel import BOUNDS, GX, GY, HXX, HXY, HYY, JET, Z_HIGH, F, FieldArrays, jet_at
+from bodyplan.ground.spline_kernel import blocks_over
 from bodyplan.kernels import lean
 
 #: columns of a section (:class:`bodyplan.gaits.carry.planes.Section`), after those of the ground's jet
@@ -88,21 +89,10 @@ def highest_at(land: FieldArrays, x: float, y: float, size_x: float, size_y: flo
         return np.inf
     if land.formula:
         return tape_range(land.span, low_x, low_y, high_x, high_y, room.span_registers)[1]
-    spline, place = land.spline, land.spline.place
-    last_x, last_y = spline.nodes.shape[1] - 2, spline.nodes.shape[0] - 2
-    # within the box these are not negative but for rounding
-    ax = min(max(int((low_x - place[2]) / place[0] - 1e-9), 0), last_x)
-    ay = min(max(int((low_y - place[3]) / place[1] - 1e-9), 0), last_y)
-    bx = min(int((high_x - place[2]) / place[0] + 1e-9), last_x)
-    by = min(int((high_y - place[3]) / place[1] + 1e-9), last_y)
-    # the level on which the box meets at most two blocks along each axis
-    span, level = max(bx - ax, by - ay), 0
-    while (1 << level) < span:
-        level += 1
-    ax, ay, bx, by = ax >> level, ay >> level, bx >> level, by >> level
-    start, width, table = spline.offsets[level], spline.widths[level], spline.tables[Z_HIGH]
-    lower, upper = start + ay * width, start + by * width
-    lowest = min(min(table[lower + ax], table[lower + bx]), min(table[upper + ax], table[upper + bx]))
+    it, place, table = land.spline, land.spline.place, land.spline.tables[Z_HIGH]
+    a, b, c, d = low_x - place[2], low_y - place[3], high_x - place[2], high_y - place[3]
+    one, two, three, four = blocks_over(it.nodes.shape[:2], place[0], place[1], it.offsets, it.widths, a, b, c, d)
+    lowest = min(min(table[one], table[two]), min(table[three], table[four]))
     return float(place[4] - lowest)
 
 
