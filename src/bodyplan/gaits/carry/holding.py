@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray, IntArray, TextArray
+from bodyplan.arrays import Array, BoolArray, TextArray
 from bodyplan.errors import MissingExtraError, Status
 from bodyplan.gaits.carry.balance import LEAST_WHEELS, Stance, friction_of, ready, stands
 from bodyplan.gaits.carry.carriage import Carriage
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: share of the weight, of a torque, and friction that the judge, who finds contacts by sampling rims, may be off by
 BALANCE = 1e-5
-#: rounding of a coefficient of friction
-CLOSE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,10 @@ def hold(wheels: Wheels, ground: Ground, body: Carriage, rolled: Rolled, ok: Boo
         except MissingExtraError as error:
             return f"No forces and torques: {error}"
         try:
-            _require(stance, rows[status[rows] == Status.OK.value], ratio.max(axis=1), required)
+            stood = rows[status[rows] == Status.OK.value]
+            some = stance.take(stood)
+            least = LeastFriction.of(some.points, some.normals, some.center, some.weight)
+            required[stood] = least.largest(ratio[stood].max(axis=1))
         except MissingExtraError as error:
             unknown = f"The least friction that holds the body is not known: {error}"
     held = np.isfinite(found).all(axis=(1, 2))
@@ -90,28 +91,6 @@ def hold(wheels: Wheels, ground: Ground, body: Carriage, rolled: Rolled, ok: Boo
         held,
         unknown,
     )
-
-
-def _require(stance: Stance, rows: IntArray, used: Array, required: Array) -> None:
-    """The largest of the least friction at the samples ``rows``, and what it is at those that had to be looked at, into
-    ``required``.
-
-    Any forces that hold a body are a bound of what it needs: at first those of least square (``used`` (T,)), then those
-    that need least at another sample, mended so that they balance here. The sample of the largest bound is solved next,
-    until no bound is larger than what is known.
-    """
-    if not len(rows):
-        return
-    few = stance.take(rows)
-    least = LeastFriction.of(few.points, few.normals, few.center, few.weight)
-    bound, most = used[rows], -1.0
-    while bound.max() > most + CLOSE * max(1.0, most):
-        i = int(bound.argmax())
-        found = least.at(i)
-        required[rows[i]], most = found.s, max(most, found.s)
-        if found.attained:
-            bound = np.fmin(bound, least.bounds(i, found.x))
-        bound[i] = -np.inf
 
 
 def judged(verdict: Verdict, holding: Holding | str, t: Array) -> Verdict:

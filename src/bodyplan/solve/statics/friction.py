@@ -16,6 +16,12 @@ from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, Memory, Parts, b
 from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import at_least_factor
 from bodyplan.solve.statics.outcome import Outcome, shaped
+from bodyplan.solve.statics.projection_kernel import project
+
+#: rounding of a coefficient
+CLOSE = 1e-12
+#: how often forces are projected: most that hold with a given friction are found by then
+ROUNDS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +123,27 @@ class LeastFriction:
         if found.resumable(loads.touching[i]):
             self._memories[i] = loads.remember(i, held, found.x, found.y), found.s
         return found
+
+    def largest(self, bound: Array) -> Array:
+        """(n,): the least coefficients of the items that decide which is the largest, nan of those that need no more
+        for certain. ``bound`` (n,): coefficients with which the items balance, as those of any forces that do.
+
+        The item of the largest bound is solved, until no bound is larger than what is known. Forces that bound other
+        items are those of one that was solved, mended, and such as alternating projections find.
+        """
+        bound, most, known = np.array(bound), -1.0, np.full(self.loads.count, np.nan)
+        x = np.zeros((self.loads.count, 3 * self.loads.contacts))
+        while bound.max(initial=-np.inf) > most + CLOSE * max(1.0, most):
+            i = int(bound.argmax())
+            found = self.at(i)
+            known[i], bound[i] = found.s, -np.inf
+            if found.attained:
+                bound = np.fmin(bound, self.bounds(i, found.x))
+            if found.s > most:
+                most = found.s
+                args = self._equations, self._inverse, self.loads.load, self.loads.touching
+                project(*args, most, ROUNDS, x, bound)
+        return known
 
     def bounds(self, i: int, x: Array) -> Array:
         """(n,): coefficients with which the items balance for certain, by forces x (k, 3) of item i and the smallest
