@@ -16,3 +16,10 @@ def lean(kernel: Kernel) -> Kernel:
     inf or nan as in NumPy. Assigning an array to a slice makes one."""
     compiled: Any = njit
     return cast(Kernel, compiled(cache=True, nogil=True, error_model="numpy", _nrt=False)(kernel))
+
+
+def inlined(kernel: Kernel) -> Kernel:
+    """:func:`lean` for kernels that are made part of those that call them. Calls hand over all numbers of every array,
+    which of some tuples of arrays are hundreds: that takes longer than the arithmetic for one pose."""
+    compiled: Any = njit
+    return cast(Kernel, compiled(nogil=True, error_model="numpy", _nrt=False, forceinline=True)(kernel))

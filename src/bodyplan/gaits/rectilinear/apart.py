@@ -12,7 +12,7 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.gaits.rectilinear.parts import Parts
-from bodyplan.kernels import lean
+from bodyplan.kernels import inlined, lean
 
 #: relative to the longest link, by how much more links keep from each other: far above rounding
 MORE = 1e-9
@@ -51,11 +51,21 @@ def apart_of(parts: Parts, lengths: Array) -> Apart:
     return Apart(span, keep, fold, float(keep.max(initial=0.0)))
 
 
-@lean
+@inlined
 def all_apart(apart: Apart, origins: Array, turn: Array, moved: BoolArray, work: Array) -> bool:
     """True where no two parts of a body can be too near: links from ``origins`` (2 N, 2) m in directions ``turn``
     (2 N, 2). Only links ``moved`` (2 N,) are looked at, and what is near them. ``work`` (2 N, 9) is room."""
     span, keep, fold, count = apart.span, apart.keep, apart.fold, len(origins)
+    for k in range(count - 1):
+        if (moved[k] or moved[k + 1]) and fold[k] > 0.0:
+            # a point r from the joint is r sin(angle) from a link that turns back, and r or more from one that does not
+            if turn[k, 0] * turn[k + 1, 0] + turn[k, 1] * turn[k + 1, 1] < 0.0:
+                if abs(turn[k, 0] * turn[k + 1, 1] - turn[k, 1] * turn[k + 1, 0]) < fold[k]:
+                    return False
+            elif fold[k] >= 1.0:
+                return False
+    if _in_line(apart, origins, turn):
+        return True
     for k in range(count):
         x, z, cosine, sine = origins[k, 0], origins[k, 1], turn[k, 0], turn[k, 1]
         work[k, 0], work[k, 1] = x + span[k, 0] * cosine, z + span[k, 0] * sine
@@ -65,13 +75,6 @@ def all_apart(apart: Apart, origins: Array, turn: Array, moved: BoolArray, work:
     work[count - 1, 8] = work[count - 1, 4]
     for k in range(count - 2, -1, -1):
         work[k, 8] = min(work[k, 4], work[k + 1, 8])  # what is ahead begins there
-        if (moved[k] or moved[k + 1]) and fold[k] > 0.0:
-            # a point r from the joint is r sin(angle) from a link that turns back, and r or more from one that does not
-            if turn[k, 0] * turn[k + 1, 0] + turn[k, 1] * turn[k + 1, 1] < 0.0:
-                if abs(turn[k, 0] * turn[k + 1, 1] - turn[k, 1] * turn[k + 1, 0]) < fold[k]:
-                    return False
-            elif fold[k] >= 1.0:
-                return False
     for k in range(count - 2):
         for j in range(k + 2, count):
             if work[j, 8] - work[k, 5] >= apart.most:
@@ -85,6 +88,19 @@ def all_apart(apart: Apart, origins: Array, turn: Array, moved: BoolArray, work:
                 continue
             if not (_beside(work, turn, k, j, need) or _beside(work, turn, j, k, need)):
                 return False
+    return True
+
+
+@lean
+def _in_line(apart: Apart, origins: Array, turn: Array) -> bool:
+    """Whether all links that do not meet come one after the other along the way, far enough from each other."""
+    ahead, second = np.inf, np.inf
+    for k in range(len(origins) - 1, -1, -1):
+        x, one, other = origins[k, 0], apart.span[k, 0] * turn[k, 0], apart.span[k, 1] * turn[k, 0]
+        # ``ahead`` of this link and the next one all others begin
+        if ahead - (x + max(one, other)) < apart.most:
+            return False
+        ahead, second = min(ahead, second), x + min(one, other)
     return True
 
 

@@ -13,7 +13,8 @@ from bodyplan.gaits.rectilinear.apart import Apart, all_apart
 from bodyplan.gaits.rectilinear.legs import elbow, leg_angles
 from bodyplan.gaits.rectilinear.moves import chord_of, swing_of
 from bodyplan.gaits.rectilinear.parts import overlap
-from bodyplan.kernels import lean
+from bodyplan.gaits.rectilinear.swing import Even, even_at
+from bodyplan.kernels import inlined, lean
 
 #: what is demanded, in the order in which it is told; elbows and lifted anchors are highest at different places
 DEMANDS = (
@@ -32,7 +33,7 @@ class Bounds(NamedTuple):
     """What ``Demands`` says, for kernels: ``limits`` (2 N - 1, 2) rad are infinite and ``limited`` is False where there
     are none; ``link`` (P,), ``ends``, ``need`` and ``leg`` are those of ``Parts``, empty where they are thin; ``most``
     m the largest need; ``apart``: when links are clear of each other whatever their parts; ``weights`` (2 N - 1,) and
-    ``shift`` m of the centre of mass; ``margin`` m NaN where it is not asked for."""
+    ``shift`` m of the centre of mass; ``margin`` m NaN where it is not asked for; ``size`` m of the longest link."""
 
     links: Array
     ceiling: float
@@ -49,14 +50,15 @@ class Bounds(NamedTuple):
     weights: Array
     shift: float
     margin: float
+    size: float
 
 
 class Pose(NamedTuple):
     """Room for one pose: ``start``, ``offset`` and ``anchors`` (N, 2) m, ``origins`` (2 N, 2) m of all links with the
     tail link and the head link, cosine and sine ``turn`` (2 N, 2) of their angles, ``angles`` (2 N,) rad, ``short`` and
     ``square`` (N - 1,) m^2 of the legs, and room (2 N, 9) for :func:`all_apart` and (P, 9) for :func:`overlap`. What
-    moves with no anchor that moves is laid once for a move: ``fresh`` (2,) says that it is not there yet, nor the parts
-    on it, ``moved`` (2 N,) which links were laid last."""
+    moves with no anchor that moves is laid and tried once for a move: ``fresh`` (2,) says that it is not there yet, nor
+    the parts on it, ``moved`` (2 N,) which links were laid last."""
 
     start: Array
     offset: Array
@@ -94,18 +96,23 @@ def room_for(bounds: Bounds) -> Pose:
     )
 
 
-@lean
-def lay(bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, pose: Pose) -> None:
-    """The snake at ``tau`` of move ``m``; NaN where a leg does not reach."""
+@inlined
+def lay(
+    bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, even: Even, only: int,
+    pose: Pose,
+) -> None:  # fmt: skip
+    """The snake at ``tau`` of move ``m``, where swings have ``even`` in common; NaN where a leg does not reach.
+    ``only``: an anchor that has moved since the last pose, whether it does in this move or not (-1: none)."""
     links, count = bounds.links, before.shape[1]
-    swing_of(before, after, lift, early, m, tau, pose.start, pose.offset)
+    swing_of(before, after, lift, early, m, tau, even, pose.start, pose.offset)
     anchors, origins, turn, moved = pose.anchors, pose.origins, pose.turn, pose.moved
     for k in range(2 * count):
         moved[k] = pose.fresh[0]
     for i in range(count):
         anchors[i, 0] = pose.start[i, 0] + pose.offset[i, 0]
         anchors[i, 1] = pose.start[i, 1] + pose.offset[i, 1]
-        if before[m, i, 0] != after[m, i, 0] or before[m, i, 1] != after[m, i, 1] or lift[m, i] != 0.0:
+        moves = before[m, i, 0] != after[m, i, 0] or before[m, i, 1] != after[m, i, 1] or lift[m, i] != 0.0
+        if moves or i == only:
             for k in range(max(2 * i - 1, 0), min(2 * i + 3, 2 * count)):
                 moved[k] = True
     for i in range(count - 1):
@@ -126,20 +133,20 @@ def lay(bounds: Bounds, before: Array, after: Array, lift: Array, early: Array, 
     pose.fresh[0] = False
 
 
-@lean
+@inlined
 def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: Array) -> None:
     """How far a pose is beyond every one of :data:`DEMANDS`, relative to links or as a share of pi, into ``out`` (7,);
     not positive where it is met, -inf where it is not asked for or the leg is not known. ``swinging`` (N,): the anchors
-    that do not carry. What comes after a demand that it is beyond by more than ``enough`` is left at -inf."""
-    links, legs = bounds.links, len(bounds.links) // 2
-    size = links[0]
-    for k in range(1, 2 * legs):
-        size = max(size, links[k])
+    that do not carry. What comes after a demand that it is beyond by more than ``enough`` is left at -inf; unless that
+    is infinite, legs that were not moved are within it."""
+    links, legs, size = bounds.links, len(bounds.links) // 2, bounds.size
     for d in range(len(out)):
         out[d] = -np.inf
     anchors, origins = pose.anchors, pose.origins
     known = True
     for i in range(legs):
+        if enough < np.inf and not pose.moved[2 * i + 1]:
+            continue
         a, b = links[2 * i], links[2 * i + 1]
         whole = (a + b) ** 2
         least = max(bounds.nearest**2, (a - b) ** 2 + 1e-12 * whole)
@@ -222,7 +229,8 @@ def worst(
     for m in range(len(before)):
         pose.fresh[:] = True
         for p in range(coarse):
-            lay(bounds, before, after, lift, early, m, p / (coarse - 1.0), pose)
+            tau = p / (coarse - 1.0)
+            lay(bounds, before, after, lift, early, m, tau, even_at(tau), -1, pose)
             excess(bounds, swinging[m], pose, np.inf, found)
             values[p] = found
         most = out[m]
@@ -250,7 +258,7 @@ def worst(
                 middle, best = where, -np.inf
                 for p in range(fine):
                     tau = min(max(middle + step * (2.0 * p / (fine - 1.0) - 1.0), 0.0), 1.0)
-                    lay(bounds, before, after, lift, early, m, tau, pose)
+                    lay(bounds, before, after, lift, early, m, tau, even_at(tau), -1, pose)
                     excess(bounds, swinging[m], pose, np.inf, found)
                     if found[d] > best:
                         best, where = found[d], tau

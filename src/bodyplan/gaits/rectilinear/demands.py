@@ -100,6 +100,7 @@ class Demands:
             np.zeros(len(limits)) if self.balance is None else np.array(self.balance.weights, dtype=np.float64),
             0.0 if self.balance is None else float(self.balance.shift),
             float(self.margin) if asked and self.margin is not None else np.nan,
+            float(self.links.max()),
         )
 
     def met(self, moves: Moves) -> list[Status]:

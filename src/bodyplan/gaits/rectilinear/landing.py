@@ -9,7 +9,7 @@ from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, room_for
-from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Steps, highest, try_move
+from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Places, Steps, highest, try_move
 from bodyplan.kernels import lean
 
 #: what is told of a spot where the anchor cannot stand, or where no swing leads to
@@ -17,8 +17,8 @@ NO_STANCE, NO_SWING = -1, -2
 
 
 class Trial(NamedTuple):
-    """Room for one move (1, N, ...) of one anchor, its pose, what it runs into (9,), and ``order`` (p,): the places at
-    which it is tried, those first at which the last one failed."""
+    """Room for one move (1, N, ...) of one anchor, its pose, what it runs into (9,), and the ``places`` at which it is
+    tried, those first at which the last one failed."""
 
     before: Array
     after: Array
@@ -28,12 +28,11 @@ class Trial(NamedTuple):
     pose: Pose
     excess: Array
     found: BoolArray
-    order: Array
-    still: Array
+    places: Places
 
 
 @njit(cache=True)
-def trial_of(bounds: Bounds, here: Array, places: Array) -> Trial:
+def trial_of(bounds: Bounds, here: Array, places: Places) -> Trial:
     """Room for moves from ``here`` (N, 2)."""
     count = len(here)
     return Trial(
@@ -45,8 +44,7 @@ def trial_of(bounds: Bounds, here: Array, places: Array) -> Trial:
         room_for(bounds),
         np.empty(len(DEMANDS)),
         np.empty(len(TRIED), dtype=np.bool_),
-        places.copy(),
-        np.zeros(1),
+        Places(places.tau, places.even, places.order.copy()),
     )
 
 
@@ -79,35 +77,40 @@ def swing_to(
     """The first of ``shapes`` in which anchor ``i`` of ``here`` (N, 2) gets to ``spot`` (2,), with its lift and how
     early it rises; or :data:`NO_STANCE`, :data:`NO_SWING`. Over level ground no other shape than the first can help
     against reach or limits, and none is lower."""
-    before, after, lift, early = trial.before, trial.after, trial.lift, trial.early
+    before, after, lift, early, order = trial.before, trial.after, trial.lift, trial.early, trial.places.order
     for c in range(2):
         after[0, i, c] = before[0, i, c] = spot[c]
     lift[0, i], early[0, i], trial.swinging[i] = 0.0, 1.0, False
-    standing = try_move(
-        bounds, steps, keeps, before, after, lift, early, trial.swinging, 0, trial.still, i, met, False, trial.pose,
-        trial.excess, trial.found,
-    )  # fmt: skip
-    for c in range(2):
-        before[0, i, c] = here[i, c]
-    out = NO_STANCE if standing >= 0 else NO_SWING
-    if standing < 0:
-        above = rise(steps, keeps, here[i], spot, i == 0, i == len(here) - 1)
-        level = spot[1] == here[i, 1] and above <= 0.0
-        for s in range(1 if level else len(shapes)):
+    out, above, level = NO_STANCE, 0.0, False
+    for s in range(-1, len(shapes)):
+        if s == 0:  # it can stand there
+            out = NO_SWING
+            for c in range(2):
+                before[0, i, c] = here[i, c]
+            above = rise(steps, keeps, here[i], spot, i == 0, i == len(here) - 1)
+            level = spot[1] == here[i, 1] and above <= 0.0
+        if s >= 0:
             lift[0, i], early[0, i] = keeps.lift + shapes[s, 0] * (above + keeps.margin), shapes[s, 1]
             trial.swinging[i] = lift[0, i] > 0.0
-            bad = try_move(
-                bounds, steps, keeps, before, after, lift, early, trial.swinging, 0, trial.order, i, met, False,
-                trial.pose, trial.excess, trial.found,
-            )  # fmt: skip
-            if bad < 0:
-                out = s
-                break
+        bad = try_move(
+            bounds, steps, keeps, before, after, lift, early, trial.swinging, 0, trial.places,
+            1 if s < 0 else len(order), i, met, False, trial.pose, trial.excess, trial.found,
+        )  # fmt: skip
+        if bad < 0 <= s:
+            out = s
+            break
+        if bad >= 0 > s:
+            break
+        if bad >= 0:
             # what was in the way here is likely to be in the way of the next
-            worst = trial.order[bad]
+            worst = order[bad]
             for p in range(bad, 0, -1):
-                trial.order[p] = trial.order[p - 1]
-            trial.order[0] = worst
+                order[p] = order[p - 1]
+            order[0] = worst
+            if level:
+                break
+    for c in range(2):
+        before[0, i, c] = here[i, c]
     high, soon = lift[0, i], early[0, i]
     for c in range(2):
         after[0, i, c] = here[i, c]
@@ -117,10 +120,10 @@ def swing_to(
 
 @njit(cache=True)
 def land(
-    bounds: Bounds, steps: Steps, keeps: Keeps, here: Array, i: int, spots: Array, shapes: Array, places: Array,
+    bounds: Bounds, steps: Steps, keeps: Keeps, here: Array, i: int, spots: Array, shapes: Array, places: Places,
     met: float, out: Array, which: IntArray,
 ) -> None:  # fmt: skip
-    """:func:`swing_to` for each of ``spots`` (K, 2), tried at ``places`` (p,), into ``which`` (K,) and ``out``
+    """:func:`swing_to` for each of ``spots`` (K, 2), tried at ``places``, into ``which`` (K,) and ``out``
     (K, 2)."""
     trial = trial_of(bounds, here, places)
     for k in range(len(spots)):

@@ -11,8 +11,8 @@ from numba import njit
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.rectilinear.legs import REACH, Leg, leg_angles, leg_rates
-from bodyplan.gaits.rectilinear.swing import swing_rates, swung
-from bodyplan.kernels import lean
+from bodyplan.gaits.rectilinear.swing import Even, even_at, swing_rates, swung
+from bodyplan.kernels import inlined, lean
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,19 +66,19 @@ class Moves:
         return State(anchors.reshape(*shape, count, 2), angles[0], angles[1], angles[2], found)
 
 
-@lean
+@inlined
 def swing_of(
-    before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, start: Array, offset: Array
+    before: Array, after: Array, lift: Array, early: Array, m: int, tau: float, even: Even, start: Array, offset: Array
 ) -> None:
     """Anchors of move ``m`` at ``tau``: ``start`` (N, 2) m, where they are at the nearer end of the move, and their
-    ``offset`` (N, 2) m from there."""
+    ``offset`` (N, 2) m from there; ``even`` as :func:`even_at` has it there."""
     for i in range(before.shape[1]):
         dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]
-        near = before if tau < 0.5 else after
-        start[i, 0], start[i, 1] = near[m, i, 0], near[m, i, 1]
+        start[i, 0] = before[m, i, 0] if tau < 0.5 else after[m, i, 0]
+        start[i, 1] = before[m, i, 1] if tau < 0.5 else after[m, i, 1]
         offset[i, 0] = offset[i, 1] = 0.0
         if dx != 0.0 or dz != 0.0 or lift[m, i] != 0.0:
-            risen_x, risen_z, left_x, left_z = swung(tau, dx, dz, lift[m, i], early[m, i])
+            risen_x, risen_z, left_x, left_z = swung(tau, even, dx, dz, lift[m, i], early[m, i])
             offset[i, 0] = risen_x if tau < 0.5 else left_x
             offset[i, 1] = risen_z if tau < 0.5 else left_z
 
@@ -114,7 +114,7 @@ def _states(
     start, offset, rates = np.empty((count, 2)), np.empty((count, 2)), np.zeros((count, 4))
     for s in range(len(tau)):
         m = which[s]
-        swing_of(before, after, lift, early, m, tau[s], start, offset)
+        swing_of(before, after, lift, early, m, tau[s], even_at(tau[s]), start, offset)
         for i in range(count):
             anchors[s, i] = start[i] + offset[i]
             dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]

@@ -10,7 +10,7 @@ from numba import njit
 from bodyplan.arrays import Array, IntArray
 from bodyplan.gaits.rectilinear.bounds import Bounds
 from bodyplan.gaits.rectilinear.landing import Trial, swing_to, trial_of
-from bodyplan.gaits.rectilinear.terrain import Keeps, Steps, highest
+from bodyplan.gaits.rectilinear.terrain import Keeps, Places, Steps, highest
 from bodyplan.kernels import lean
 
 #: what is not known of a spot before it is tried
@@ -34,14 +34,14 @@ class Ranges(NamedTuple):
 class Choice(NamedTuple):
     """What spots and swings are tried: ``spots`` at equal steps from standing to reach, then in how many ``rounds``
     ``closer`` more beyond the farthest that goes; the next ones that go at ``shares`` (m,) of the way to it. ``shapes``
-    (k, 2) of swings; ``places`` (p,) along the way, those first at which something in the way shows early."""
+    (k, 2) of swings; ``places`` along the way, those first at which something in the way shows early."""
 
     spots: int
     closer: int
     rounds: int
     shares: Array
     shapes: Array
-    places: Array
+    places: Places
 
 
 class Offers(NamedTuple):
@@ -60,7 +60,7 @@ class Offers(NamedTuple):
     after: Array
     lift: Array
     early: Array
-    order: Array
+    order: IntArray
 
 
 @lean
@@ -206,12 +206,13 @@ def farthest(
         here.copy(),
         np.zeros(len(here)),
         np.ones(len(here)),
-        np.empty((size, len(choice.places))),
+        np.empty((size, len(choice.places.order)), dtype=np.int64),
     )
     trial, at = trial_of(bounds, here, choice.places), np.empty(most)
     for g in range(size):
         i = group[g]
-        trial.order[:] = choice.places
+        trial.places.order[:] = choice.places.order
+        trial.pose.fresh[:] = True
         count, (low, high) = places_of(ranges, choice.spots, here, i, at), _room(ranges, here, i)
         for roomy in (True, False):
             n = 0
@@ -224,7 +225,7 @@ def farthest(
             if offers.at[g] >= 0:
                 _tell(offers, g)
                 break
-        offers.order[g] = trial.order
+        offers.order[g] = trial.places.order
     return offers
 
 
@@ -235,9 +236,10 @@ def nearer(
     """Offer the next landing spot behind for every anchor that has one; False where none has."""
     trial, some = trial_of(bounds, offers.here, choice.places), False
     for g in range(len(offers.group)):
-        trial.order[:] = offers.order[g]
+        trial.places.order[:] = offers.order[g]
+        trial.pose.fresh[:] = True
         if _nearer(bounds, steps, keeps, ranges, choice, met, offers, trial, g):
             some = True
             _tell(offers, g)
-        offers.order[g] = trial.order
+        offers.order[g] = trial.places.order
     return some

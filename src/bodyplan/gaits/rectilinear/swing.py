@@ -13,6 +13,9 @@ PATHS = ("cycloid",)
 #: how long a step up that rises early waits before it goes along, as a share of what it is early by
 WAIT = 0.6
 
+#: X(u), X(1 - u) and sin^2(pi u), of which all swings that do not rise early are made
+Even = tuple[float, float, float]
+
 
 class Swing(NamedTuple):
     """Anchors on their way: displacement from where they rose (``risen``) and from where they land (``landing``), and
@@ -52,7 +55,7 @@ def cycloid(u: Array) -> Array:
 @lean
 def _swings(tau: Array, dx: Array, dz: Array, lift: Array, early: Array, out: Array) -> None:
     for k in range(len(tau)):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = swung(tau[k], dx[k], dz[k], lift[k], early[k])
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = swung(tau[k], even_at(tau[k]), dx[k], dz[k], lift[k], early[k])
         out[k, 4], out[k, 5], out[k, 6], out[k, 7] = swing_rates(tau[k], dx[k], dz[k], lift[k], early[k])
 
 
@@ -63,17 +66,25 @@ def _cycloids(u: Array, out: Array) -> None:
 
 
 @lean
-def swung(tau: float, dx: float, dz: float, lift: float, early: float) -> tuple[float, float, float, float]:
-    """One anchor of :func:`swing`: ``risen`` and ``landing``, each along and up."""
+def even_at(tau: float) -> Even:
+    """What swings that rise evenly share at ``tau``."""
     u, rest = _smooth(tau), _smooth(1.0 - tau)  # rest = 1 - u, exact where it is small
-    up, down = _parts(u, rest, 1.0 - early, dz >= 0.0)
-    rise, fall = _cycloid(up), _cycloid(down)
+    return _cycloid(u), _cycloid(rest), np.sin(np.pi * min(u, rest)) ** 2
+
+
+@lean
+def swung(
+    tau: float, even: Even, dx: float, dz: float, lift: float, early: float
+) -> tuple[float, float, float, float]:
+    """One anchor of :func:`swing`: ``risen`` and ``landing``, each along and up; ``even``: what swings share there."""
+    rise, fall, hump = even
     along, left = rise, fall
     if early < 1.0:
+        u, rest = _smooth(tau), _smooth(1.0 - tau)
+        up, down = _parts(u, rest, 1.0 - early, dz >= 0.0)
         behind, ahead = _parts(u, rest, WAIT * (1.0 - early), dz < 0.0)
-        along, left = _cycloid(behind), _cycloid(ahead)
-    hump = lift * np.sin(np.pi * min(u, rest)) ** 2
-    return dx * along, dz * rise + hump, -dx * left, hump - dz * fall
+        rise, fall, along, left = _cycloid(up), _cycloid(down), _cycloid(behind), _cycloid(ahead)
+    return dx * along, dz * rise + lift * hump, -dx * left, lift * hump - dz * fall
 
 
 @lean

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from bodyplan.arrays import Array, BoolArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.bounds import DEMANDS, Bounds, Pose, excess, lay, room_for
-from bodyplan.kernels import lean
+from bodyplan.gaits.rectilinear.swing import even_at
+from bodyplan.kernels import inlined, lean
 
 #: relative slack of a foot that stands
 STANDS = 1e-12
@@ -47,6 +48,15 @@ class Keeps(NamedTuple):
     crouch: float
     lift: float
     size: float
+
+
+class Places(NamedTuple):
+    """Places along a move at which it is tried: ``tau`` (p,), what swings share there ``even`` (p, 3), and in which
+    ``order`` (p,) they are looked at."""
+
+    tau: Array
+    even: Array
+    order: IntArray
 
 
 @lean
@@ -150,7 +160,7 @@ def _at_corner(xs: Array, zs: Array, x0: float, z0: float, x1: float, z1: float,
     return False
 
 
-@lean
+@inlined
 def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -> tuple[bool, bool]:
     """Whether a pose reaches into the floor or its edges, and into the ceiling. ``only``: the one anchor with whose
     legs, tail or head link that may be (-1: all)."""
@@ -203,7 +213,7 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
     return floor, ceiling
 
 
-@lean
+@inlined
 def _crouched(steps: Steps, keeps: Keeps, pose: Pose, at: Array) -> bool:
     """Whether the body is higher than the lowest place near anchors ``at`` (N, 2) leaves room for."""
     low, high = pose.anchors[0, 1], -np.inf
@@ -215,7 +225,16 @@ def _crouched(steps: Steps, keeps: Keeps, pose: Pose, at: Array) -> bool:
     return bool(high - low - (room - keeps.rest - keeps.top - keeps.margin) > 0.0)
 
 
-@lean
+@njit(cache=True)
+def places_at(tau: Array) -> Places:
+    """The places ``tau`` (p,) in the order in which they are given."""
+    even = np.empty((len(tau), 3))
+    for p in range(len(tau)):
+        even[p, 0], even[p, 1], even[p, 2] = even_at(tau[p])
+    return Places(tau, even, np.arange(len(tau)))
+
+
+@inlined
 def try_move(
     bounds: Bounds,
     steps: Steps,
@@ -226,7 +245,8 @@ def try_move(
     early: Array,
     swinging: BoolArray,
     m: int,
-    places: Array,
+    places: Places,
+    count: int,
     only: int,
     met: float,
     every: bool,
@@ -234,42 +254,42 @@ def try_move(
     found: Array,
     out: BoolArray,
 ) -> int:
-    """What of :data:`TRIED` move ``m`` runs into at ``places`` (p,) of tau, into ``out`` (9,), and the place where the
-    first was found, -1 where none is. ``every``: all of it, the ground only where the demands are met; or else the
-    first thing that is found. ``pose`` and ``found`` (7,) are room."""
+    """What of :data:`TRIED` move ``m`` runs into at the first ``count`` places, into ``out`` (9,), and the number of
+    the one where the first was found, -1 where none is. ``every``: all of it, the ground only where the demands are
+    met; or else the first thing that is found. ``pose`` and ``found`` (7,) are room; of a ``pose`` that is not fresh
+    what neither stands nor moves with anchor ``only`` has been found good before."""
     enough = np.inf if every else met
-    first = -1
+    first, met_all, floor, ceiling = -1, True, False, False
     for d in range(len(out)):
         out[d] = False
-    pose.fresh[0] = pose.fresh[1] = True
-    for p in range(len(places)):
-        lay(bounds, before, after, lift, early, m, places[p], pose)
+    even = places.even
+    for p in range(count):
+        at, new, parts = places.order[p], pose.fresh[0], pose.fresh[1]
+        tau = places.tau[at]
+        lay(bounds, before, after, lift, early, m, tau, (even[at, 0], even[at, 1], even[at, 2]), only, pose)
         excess(bounds, swinging, pose, enough, found)
         bad = False
         for d in range(len(DEMANDS)):
             if found[d] > met:
                 out[d] = bad = True
-        if not bad and not every:
-            out[FLOOR], out[CEILING] = into_ground(steps, keeps, pose, only, met)
-            bad = out[FLOOR] or out[CEILING]
+        met_all = met_all and not bad
+        if met_all:
+            floor_here, ceiling_here = into_ground(steps, keeps, pose, only, met)
+            floor, ceiling = floor or floor_here, ceiling or ceiling_here
+            bad = not every and (floor_here or ceiling_here)
         if not np.isnan(keeps.crouch):
             low = _crouched(steps, keeps, pose, before[m])
-            if places[p] == 1.0:
+            if tau == 1.0:
                 low = low or _crouched(steps, keeps, pose, after[m])
             out[CEILING] = out[CEILING] or low
             bad = bad or low
         if bad and first < 0:
             first = p
             if not every:
-                return first
-    met_all = True
-    for d in range(len(DEMANDS)):
-        met_all = met_all and not out[d]
-    if every and met_all:
-        for p in range(len(places)):
-            lay(bounds, before, after, lift, early, m, places[p], pose)
-            floor, ceiling = into_ground(steps, keeps, pose, only, met)
-            out[FLOOR], out[CEILING] = out[FLOOR] or floor, out[CEILING] or ceiling
+                pose.fresh[0], pose.fresh[1] = new, parts
+                break
+    if met_all:
+        out[FLOOR], out[CEILING] = floor, out[CEILING] or ceiling
     return first
 
 
@@ -283,7 +303,7 @@ def try_moves(
     lift: Array,
     early: Array,
     swinging: BoolArray,
-    places: Array,
+    places: Places,
     only: int,
     met: float,
     every: bool,
@@ -292,6 +312,7 @@ def try_moves(
     """:func:`try_move` for every move, into ``out`` (M, 9)."""
     pose, found = room_for(bounds), np.empty(len(DEMANDS))
     for m in range(len(before)):
+        pose.fresh[:] = True
         try_move(
             bounds,
             steps,
@@ -303,6 +324,7 @@ def try_moves(
             swinging[m],
             m,
             places,
+            len(places.order),
             only,
             met,
             every,

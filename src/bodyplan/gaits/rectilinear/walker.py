@@ -16,7 +16,7 @@ from bodyplan.gaits.rectilinear.landing import land
 from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.offers import Choice, Offers, Ranges, farthest, nearer, places
 from bodyplan.gaits.rectilinear.snake import InchingSnake
-from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Steps, try_moves
+from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Places, Steps, places_at, try_moves
 from bodyplan.gaits.rectilinear.track import Track
 
 #: landing spots tried between standing and reach, and rounds that close in on the farthest good one with a few more
@@ -87,10 +87,10 @@ class Walker:
         """Anchors (..., N, 2) along and up, standing at s (..., N) m."""
         return np.stack([s, self.track.height(s) + self.snake.rest], axis=-1)
 
-    def tried(self, moves: Moves, places: Array, only: int | None = None) -> list[Status]:
-        """The first demand, floor or ceiling that each move runs into at ``places`` (p,) of tau, or ok. ``only``: the
+    def tried(self, moves: Moves, tau: Array, only: int | None = None) -> list[Status]:
+        """The first demand, floor or ceiling that each move runs into at ``tau`` (p,), or ok. ``only``: the
         one anchor that moves in all of them; what does not move with it has been tried before."""
-        found = self._into(moves, places, only, True)
+        found = self._into(moves, _places(tau), only, True)
         told = np.arange(len(TRIED))
         if np.isfinite(self.demands.ceiling):  # a ceiling of its own is told in its place among the demands
             found[:, TRIED.index(Status.ABOVE_CEILING)] |= found[:, told[-1]]
@@ -101,7 +101,7 @@ class Walker:
         most of them lie between those at which the moves have been tried."""
         return np.asarray(~self._into(moves, _halved(places), None, False, between).any(axis=1))
 
-    def _into(self, moves: Moves, places: Array, only: int | None, every: bool, between: bool = False) -> BoolArray:
+    def _into(self, moves: Moves, places: Places, only: int | None, every: bool, between: bool = False) -> BoolArray:
         """(M, 9): what each move runs into, all of it with ``every``, else the first thing that is found."""
         keeps = self.least if between else self.keeps
         out = np.empty((len(moves), len(TRIED)), dtype=bool)
@@ -123,8 +123,8 @@ class Walker:
     def _land(self, here: Array, i: int, spots: Array) -> tuple[IntArray, Array]:
         which, made = np.empty(len(spots), dtype=np.int64), np.zeros((len(spots), 2))
         land(
-            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _CHOICE.shapes,
-            _CHOICE.places, MET, made, which,
+            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(here), i, spots, _choice().shapes,
+            _choice().places, MET, made, which,
         )  # fmt: skip
         return which, made
 
@@ -158,12 +158,12 @@ class Walker:
     def offers(self, here: Array, group: IntArray) -> Offers:
         """The farthest landing spots of the anchors ``group`` (G,) of ``here`` (N, 2), with lift and shape of swings,
         those first that make no leg too short for the next move."""
-        found: Offers = farthest(*self._known, _CHOICE, MET, np.ascontiguousarray(here), group)
+        found: Offers = farthest(*self._known, _choice(), MET, np.ascontiguousarray(here), group)
         return found
 
     def nearer(self, offers: Offers) -> bool:
         """Offer what lies next behind; False where nothing does."""
-        return bool(nearer(*self._known, _CHOICE, MET, offers))
+        return bool(nearer(*self._known, _choice(), MET, offers))
 
     @cached_property
     def _known(self) -> tuple[Bounds, Steps, Keeps, Ranges]:
@@ -197,10 +197,19 @@ class Walker:
 
 
 @cache
-def _halved(count: int) -> Array:
+def _halved(count: int) -> Places:
     """``count`` places from 0 to 1, coarse ones first and 0 last: what a move runs into shows early."""
     turned = [int(f"{k:032b}"[::-1], 2) if k else 1 << 32 for k in range(count)]
-    return np.linspace(0.0, 1.0, count)[np.argsort(turned, kind="stable")]
+    return _places(np.linspace(0.0, 1.0, count)[np.argsort(turned, kind="stable")])
 
 
-_CHOICE = Choice(SPOTS, CLOSER, ROUNDS, np.array(SHARES), np.array(SHAPES), _halved(PLACES))
+def _places(tau: Array) -> Places:
+    """Places ``tau`` (p,) in this order."""
+    found: Places = places_at(tau)
+    return found
+
+
+@cache
+def _choice() -> Choice:
+    """What is tried of every stance."""
+    return Choice(SPOTS, CLOSER, ROUNDS, np.array(SHARES), np.array(SHAPES), _halved(PLACES))
