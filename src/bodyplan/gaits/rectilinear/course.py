@@ -12,6 +12,7 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import Demands, move_names, phases
+from bodyplan.gaits.rectilinear.landings import Landings
 from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.search import NARROW, WIDE, Way, search
 from bodyplan.gaits.rectilinear.sequence import Sequence
@@ -250,9 +251,9 @@ def _over_steps(
 def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: float) -> tuple[Way, int]:
     """The first way at a good pace that searches find, narrow ones first, or else the farthest; and how many stances
     were tried. Where narrow ones find none under a ceiling the snake comes to low places stretched."""
-    walkers = [walker]
+    walkers = [Landings(walker)]
     if np.isfinite(walker.track.steps.roof_z).any():
-        walkers.append(replace(walker, crouch=float(walker.demands.straight.max())))
+        walkers.append(Landings(replace(walker, crouch=float(walker.demands.straight.max()))))
     tried, far = 0, wanted * pace
     ways: list[Way] = []
     for each, breadth in [*product(walkers, NARROW), *product(walkers, [WIDE])]:

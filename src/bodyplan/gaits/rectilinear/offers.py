@@ -45,22 +45,27 @@ class Choice(NamedTuple):
 
 
 class Offers(NamedTuple):
-    """What is known of the landing spots of the anchors ``group`` (G,) of a stance ``here`` (N, 2): ``spots``
-    (G, K, 4), ascending, with s and height m, lift m and how early the swing rises; ``known`` (G, K) :data:`UNKNOWN`,
-    negative for those where nothing goes; ``last`` (G,) the farthest that goes and ``at`` (G,) the one that is offered,
-    -1 where there is none; ``after`` (N, 2), ``lift`` and ``early`` (N,): the move to the spots ``at``; ``order``
-    (G, p) of places, those first at which swings failed last."""
+    """What is known of the landing spots of the anchors of a phase, G of them, for S stances ``here`` (S, N, 2):
+    ``spots`` (S, G, K, 4), ascending, with s and height m, lift m and how early the swing rises; ``known`` (S, G, K)
+    :data:`UNKNOWN`, negative for those where nothing goes; ``last`` (S, G) the farthest that goes and ``at`` (S, G) the
+    one that is offered, -1 where there is none; ``order`` (S, G, p) of places, those first at which swings failed
+    last."""
 
     here: Array
-    group: IntArray
     spots: Array
     known: IntArray
     last: IntArray
     at: IntArray
-    after: Array
-    lift: Array
-    early: Array
     order: IntArray
+
+
+def offers_for(ranges: Ranges, choice: Choice, here: Array, size: int) -> Offers:
+    """Room for what is offered to a phase of ``size`` anchors of stances ``here`` (S, N, 2)."""
+    most = choice.spots + int(np.diff(ranges.first).max()) + choice.closer * choice.rounds
+    shape = (len(here), size)
+    known, last, at = (np.empty(some, dtype=np.int64) for some in ((*shape, most), shape, shape))
+    order = np.empty((*shape, len(choice.places.order)), dtype=np.int64)
+    return Offers(here, np.empty((*shape, most, 4)), known, last, at, order)
 
 
 @lean
@@ -115,36 +120,36 @@ def _room(ranges: Ranges, here: Array, i: int) -> tuple[float, float]:
 
 @lean
 def _goes(
-    bounds: Bounds, steps: Steps, keeps: Keeps, choice: Choice, met: float, offers: Offers, trial: Trial, g: int, k: int
+    bounds: Bounds, steps: Steps, keeps: Keeps, choice: Choice, met: float, offers: Offers, trial: Trial, b: int,
+    g: int, i: int, k: int,
 ) -> bool:  # fmt: skip
-    """Whether the anchor at ``g`` in its group gets to spot ``k``; found out where that is not known."""
-    spot, known = offers.spots[g, k], offers.known[g]
+    """Whether anchor ``i``, at ``g`` in its group, of stance ``b`` gets to spot ``k``; found out where that is not
+    known."""
+    spot, known = offers.spots[b, g, k], offers.known[b, g]
     if known[k] == UNKNOWN:
         spot[1] = highest(steps.floor_x, steps.floor_z, spot[0], spot[0]) + keeps.rest
-        known[k], spot[2], spot[3] = swing_to(
-            bounds, steps, keeps, trial, offers.here, offers.group[g], spot, choice.shapes, met
-        )
+        known[k], spot[2], spot[3] = swing_to(bounds, steps, keeps, trial, offers.here[b], i, spot, choice.shapes, met)
     return bool(known[k] >= 0)
 
 
 @lean
 def _farthest(
     bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, offers: Offers,
-    trial: Trial, g: int, count: int,
+    trial: Trial, b: int, g: int, i: int, count: int,
 ) -> None:  # fmt: skip
     """Offer the farthest of the first ``count`` spots that goes, or one beyond it that is closer to where nothing goes
     any more. What lies behind is not tried."""
-    spots, known, i = offers.spots[g], offers.known[g], offers.group[g]
+    here, spots, known = offers.here[b], offers.spots[b, g], offers.known[b, g]
     last = -1
     for k in range(count - 1, -1, -1):
-        if _goes(bounds, steps, keeps, choice, met, offers, trial, g, k):
+        if _goes(bounds, steps, keeps, choice, met, offers, trial, b, g, i, k):
             last = k
             break
-    offers.last[g] = offers.at[g] = last
+    offers.last[b, g] = offers.at[b, g] = last
     if last < 0:
         return
-    (low, high), far = _room(ranges, offers.here, i), reach(ranges, offers.here, i)
-    step = (far - offers.here[i, 0]) / choice.spots
+    (low, high), far = _room(ranges, here, i), reach(ranges, here, i)
+    step = (far - here[i, 0]) / choice.spots
     for _ in range(choice.rounds):
         begin = spots[last, 0]
         for k in range(choice.closer, 0, -1):
@@ -152,94 +157,117 @@ def _farthest(
             if x >= far or not low <= x <= high:
                 continue
             spots[last + k, 0], known[last + k] = x, UNKNOWN
-            if _goes(bounds, steps, keeps, choice, met, offers, trial, g, last + k):
+            if _goes(bounds, steps, keeps, choice, met, offers, trial, b, g, i, last + k):
                 for j in range(1, k):
                     spots[last + j, 0], known[last + j] = begin + step * j / (choice.closer + 1), UNKNOWN
                 last += k
                 break
         step /= choice.closer + 1
-    offers.last[g] = offers.at[g] = last
+    offers.last[b, g] = offers.at[b, g] = last
 
 
 @lean
-def _nearer(
+def _next(
     bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, offers: Offers,
-    trial: Trial, g: int,
+    trial: Trial, b: int, g: int, i: int,
 ) -> bool:  # fmt: skip
     """Offer the next spot behind, if there is one: beside an edge, or the first that goes from a share of the way to
     the farthest one on."""
-    i, wanted = offers.group[g], False
-    for k in range(offers.at[g] - 1, -1, -1):
+    wanted, last = False, offers.last[b, g]
+    for k in range(offers.at[b, g] - 1, -1, -1):
         for s in range(len(choice.shares)):
-            wanted = wanted or int(np.round(choice.shares[s] * offers.last[g])) == k
+            wanted = wanted or int(np.round(choice.shares[s] * last)) == k
         asked = wanted
         for e in range(ranges.first[i], ranges.first[i + 1]):
-            asked = asked or abs(ranges.edges[e] - offers.spots[g, k, 0]) < AT_EDGE
-        if asked and _goes(bounds, steps, keeps, choice, met, offers, trial, g, k):
-            offers.at[g] = k
+            asked = asked or abs(ranges.edges[e] - offers.spots[b, g, k, 0]) < AT_EDGE
+        if asked and _goes(bounds, steps, keeps, choice, met, offers, trial, b, g, i, k):
+            offers.at[b, g] = k
             return True
     return False
 
 
 @lean
-def _tell(offers: Offers, g: int) -> None:
-    k, i = offers.at[g], offers.group[g]
-    offers.after[i, 0], offers.after[i, 1] = offers.spots[g, k, 0], offers.spots[g, k, 1]
-    offers.lift[i], offers.early[i] = offers.spots[g, k, 2], offers.spots[g, k, 3]
+def _begin(trial: Trial, here: Array, order: IntArray) -> None:
+    """Another anchor, or one of another stance ``here`` (N, 2)."""
+    trial.pose.fresh[0] = trial.pose.fresh[1] = True
+    for i in range(len(here)):
+        for c in range(2):
+            trial.before[0, i, c] = trial.after[0, i, c] = here[i, c]
+    for p in range(len(order)):
+        trial.places.order[p] = order[p]
+
+
+@lean
+def _nearer(
+    bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, offers: Offers,
+    trial: Trial, group: IntArray, b: int,
+) -> bool:  # fmt: skip
+    """Offer the next landing spot behind for every anchor of stance ``b`` that has one; False where none has."""
+    some = False
+    for g in range(len(group)):
+        _begin(trial, offers.here[b], offers.order[b, g])
+        if _next(bounds, steps, keeps, ranges, choice, met, offers, trial, b, g, group[g]):
+            some = True
+        for p in range(len(trial.places.order)):
+            offers.order[b, g, p] = trial.places.order[p]
+    return some
+
+
+@lean
+def _tell(offers: Offers, group: IntArray, b: int, out: Array) -> None:
+    """The move that is offered to stance ``b`` into ``out`` (N, 4): where the anchors are then, m along and up, lift m
+    and how early they rise."""
+    for i in range(len(out)):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = offers.here[b, i, 0], offers.here[b, i, 1], 0.0, 1.0
+    for g in range(len(group)):
+        if offers.at[b, g] >= 0:
+            for c in range(4):
+                out[group[g], c] = offers.spots[b, g, offers.at[b, g], c]
 
 
 @njit(cache=True)
 def farthest(
-    bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, here: Array, group: IntArray
-) -> Offers:  # fmt: skip
-    """Offers of the farthest landing spots of anchors ``group`` (G,) of ``here`` (N, 2); among those that make no leg
-    too short where one of these goes."""
-    size, edges = len(group), ranges.first[1:] - ranges.first[:-1]
-    most = choice.spots + edges.max() + choice.closer * choice.rounds
-    offers = Offers(
-        here.copy(),
-        group,
-        np.empty((size, most, 4)),
-        np.empty((size, most), dtype=np.int64),
-        np.empty(size, dtype=np.int64),
-        np.empty(size, dtype=np.int64),
-        here.copy(),
-        np.zeros(len(here)),
-        np.ones(len(here)),
-        np.empty((size, len(choice.places.order)), dtype=np.int64),
-    )
-    trial, at = trial_of(bounds, here, choice.places), np.empty(most)
-    for g in range(size):
-        i = group[g]
-        trial.places.order[:] = choice.places.order
-        trial.pose.fresh[:] = True
-        count, (low, high) = places_of(ranges, choice.spots, here, i, at), _room(ranges, here, i)
-        for roomy in (True, False):
-            n = 0
-            for k in range(count):
-                if (low <= at[k] <= high) == roomy:
-                    offers.spots[g, n, 0] = at[k]
-                    n += 1
-            offers.known[g] = UNKNOWN
-            _farthest(bounds, steps, keeps, ranges, choice, met, offers, trial, g, n)
-            if offers.at[g] >= 0:
-                _tell(offers, g)
-                break
-        offers.order[g] = trial.places.order
-    return offers
+    bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, group: IntArray,
+    offers: Offers, out: Array, told: IntArray,
+) -> None:  # fmt: skip
+    """Offer the farthest landing spots of the anchors ``group`` (G,) of every stance; among those that make no leg too
+    short where one of these goes. Into ``out`` (S, A, N, 4) that move and the next ones behind it, ``told`` (S,) of
+    them."""
+    trial = trial_of(bounds, offers.here[0], choice.places)
+    at = np.empty(offers.spots.shape[2])
+    for b in range(len(offers.here)):
+        here, some = offers.here[b], False
+        for g in range(len(group)):
+            i = group[g]
+            _begin(trial, here, choice.places.order)
+            count, (low, high) = places_of(ranges, choice.spots, here, i, at), _room(ranges, here, i)
+            for roomy in (True, False):
+                n = 0
+                for k in range(count):
+                    if (low <= at[k] <= high) == roomy:
+                        offers.spots[b, g, n, 0], offers.known[b, g, n] = at[k], UNKNOWN
+                        n += 1
+                _farthest(bounds, steps, keeps, ranges, choice, met, offers, trial, b, g, i, n)
+                if offers.at[b, g] >= 0:
+                    some = True
+                    break
+            for p in range(len(trial.places.order)):
+                offers.order[b, g, p] = trial.places.order[p]
+        told[b] = 0
+        while some and told[b] < out.shape[1]:
+            _tell(offers, group, b, out[b, told[b]])
+            told[b] += 1
+            if told[b] < out.shape[1]:
+                some = _nearer(bounds, steps, keeps, ranges, choice, met, offers, trial, group, b)
 
 
 @njit(cache=True)
 def nearer(
-    bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, offers: Offers
+    bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, group: IntArray,
+    offers: Offers, b: int, out: Array,
 ) -> bool:  # fmt: skip
-    """Offer the next landing spot behind for every anchor that has one; False where none has."""
-    trial, some = trial_of(bounds, offers.here, choice.places), False
-    for g in range(len(offers.group)):
-        trial.places.order[:] = offers.order[g]
-        trial.pose.fresh[:] = True
-        if _nearer(bounds, steps, keeps, ranges, choice, met, offers, trial, g):
-            some = True
-            _tell(offers, g)
-        offers.order[g] = trial.places.order
+    """Offer stance ``b`` what lies next behind, into ``out`` (N, 4); False where nothing does."""
+    trial = trial_of(bounds, offers.here[b], choice.places)
+    some = _nearer(bounds, steps, keeps, ranges, choice, met, offers, trial, group, b)
+    _tell(offers, group, b, out)
     return some

@@ -11,7 +11,6 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import count, pairwise
 
 import numpy as np
@@ -19,12 +18,12 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import move_names, phases
+from bodyplan.gaits.rectilinear.landings import Ahead, Landing, Landings, far_of, moves_of
 from bodyplan.gaits.rectilinear.moves import Moves
-from bodyplan.gaits.rectilinear.offers import Offers
 from bodyplan.gaits.rectilinear.walker import Walker, Why
 
-#: places along a move at which it is tried when its turn comes, and those of the way that is found
-CLOSE, FINAL = 121, 361
+#: places along a move at which those of the way that is found are tried
+FINAL = 361
 #: states as good as the best to this many moves are tried with it; the most in all, or for every move that is wanted
 NEAR, MOST_STATES, A_MOVE = 0.5, 3000, 40
 #: what a move counts in units of the pace over level ground: less than 1, so that slow places are gone through
@@ -55,28 +54,33 @@ WIDE = Breadth(16, 0.1, 500)
 HIGHER = (1.02, 1.05, 1.1, 1.2)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class _State:
-    """Anchors (N, 2) before phase ``phase`` of cycle ``cycle``, how they came there (the state before and the move,
-    None where they stayed), in how many moves, and how often nothing could move."""
+    """Anchors ``at`` (N, 4) as in :class:`Landing`, their mean ``far`` m, before phase ``phase`` of cycle ``cycle``; in
+    how many moves they came there, and how often nothing could move; the state ``before`` and where they landed, None
+    where they stayed."""
 
-    anchors: Array
+    at: Array
+    far: float
     phase: int = 0
     cycle: int = 0
     made: int = 0
     held: int = 0
     before: _State | None = None
-    move: Moves | None = None
-
-    @cached_property
-    def far(self) -> float:
-        """m: mean of the anchors."""
-        return float(np.add.reduce(self.anchors[:, 0])) / len(self.anchors)
+    landing: Landing | None = None
 
     def then(self, phases: int) -> tuple[int, int]:
         """Phase and cycle after this one's."""
         after = (self.phase + 1) % phases
         return after, self.cycle + (after == 0)
+
+    def staying(self, phases: int, stuck: bool) -> _State:
+        """The state after a phase in which nothing moves."""
+        return _State(self.at, self.far, *self.then(phases), self.made, self.held + stuck, self)
+
+    def moved(self, phases: int, landing: Landing) -> _State:
+        """The state after the anchors have landed."""
+        return _State(landing.row, landing.far, *self.then(phases), self.made + 1, self.held, self, landing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +101,9 @@ class Way:
 
 
 def search(
-    walker: Walker, start: Array, schedule: str, most: int, pace: float, breadth: Breadth = WIDE, partly: bool = True
-) -> Way:
+    landings: Landings, start: Array, schedule: str, most: int, pace: float, breadth: Breadth = WIDE,
+    partly: bool = True,
+) -> Way:  # fmt: skip
     """The way over the steps from anchors ``start`` (N, 2) in ``most`` moves; ``pace`` m a move is that over level
     ground.
 
@@ -107,32 +112,32 @@ def search(
     behind it only when its turn comes: few of those are ever tried. Of a way that does not go on all its moves are told
     with the reason; without ``partly`` none.
     """
-    groups, names = phases(len(start), schedule), move_names(len(start), schedule)
-    link = float(walker.snake.links.mean())
-    heaps: list[list[tuple[float, int, _State, Offers | None]]] = [[] for _ in groups]
+    walker, groups, names = landings.walker, phases(len(start), schedule), move_names(len(start), schedule)
+    size, link = len(groups), float(landings.walker.snake.links.mean())
+    heaps: list[list[tuple[float, int, _State, Ahead | None, int]]] = [[] for _ in groups]
     seen: dict[tuple[int, ...], tuple[int, float]] = {}
     counter = count()
-    best, none = _State(start), (most + 1, -np.inf)
+    first_row = np.concatenate([start, np.zeros((len(start), 1)), np.ones((len(start), 1))], axis=1)
+    best, none = _State(first_row, float(far_of(first_row))), (most + 1, -np.inf)
 
-    def push(state: _State, offers: Offers | None = None) -> None:
+    def push(state: _State, ahead: Ahead | None = None, k: int = 0) -> None:
         gone = (state.far - best_start) / pace
-        heapq.heappush(
-            heaps[state.phase], (WEIGHT * state.made + HELD * state.held - gone, next(counter), state, offers)
-        )
+        cost = WEIGHT * state.made + HELD * state.held - gone
+        heapq.heappush(heaps[state.phase], (cost, next(counter), state, ahead, k))
 
     def pop(phase: int) -> _State:
-        """The most promising state; what is offered next after it is pushed instead."""
-        state, offers = heapq.heappop(heaps[phase])[2:]
-        if offers is not None and walker.nearer(offers):
-            before = state.before
-            assert before is not None
-            push(_moved(before, offers, names[before.phase], len(groups)), offers)
+        """The most promising state; the next landing behind it is pushed instead."""
+        state, ahead, k = heapq.heappop(heaps[phase])[2:]
+        if ahead is not None:
+            landing, before = landings.landing(ahead, k + 1), state.before
+            if landing is not None and before is not None:
+                push(before.moved(size, landing), ahead, k + 1)
         return state
 
     cell = breadth.alike * link
 
     def stance(state: _State) -> tuple[int, ...]:
-        return state.phase, *[round(x / cell) for x in state.anchors[:, 0].tolist()]
+        return state.phase, *[round(x / cell) for x in state.at[:, 0].tolist()]
 
     best_start = best.far
     push(best)
@@ -154,7 +159,7 @@ def search(
             seen[at], taken[state] = (min(made, state.made), max(far, state.far)), (at, known)
             batch.append(state)
         expanded += len(batch)
-        batch = _sound(walker, [s for s in batch if not wrong or not wrong.intersection(_line(s))])
+        batch = _sound(landings, [s for s in batch if not wrong or not wrong.intersection(_line(s))])
         # those alike get their turn where the one that stood for them does not go
         left = set(taken).difference(batch)
         for state in reversed([s for s in taken if s in left]):
@@ -174,34 +179,38 @@ def search(
         for state in done:
             line = _mended(walker, state)
             if line[-1].made >= most:
-                return _way(line, Status.OK, "", expanded)
+                return _way(line, names, Status.OK, "", expanded)
             wrong.add(_line(state)[len(line)])
-        for state in (s for s in batch if s.made < most):
-            offers = walker.offers(state.anchors, groups[phase])
-            stuck = bool((offers.at < 0).all())
-            push(_State(state.anchors, *state.then(len(groups)), state.made, state.held + stuck, state))
-            if not stuck:
-                push(_moved(state, offers, names[phase], len(groups)), offers)
+        on = [s for s in batch if s.made < most]
+        for state, spots in zip(on, landings.ahead([s.at for s in on], groups[phase]), strict=True):
+            landing = landings.landing(spots, 0)
+            push(state.staying(size, landing is None))
+            if landing is not None:
+                push(state.moved(size, landing), spots)
     if not partly:
-        return _way([], Status.OUT_OF_REACH, "", expanded)
+        return _way([], names, Status.OUT_OF_REACH, "", expanded)
     line = _mended(walker, best)
     best = line[-1]
     why: Why = Counter()
     for group, name in zip(groups, names, strict=True):
         for i in group:
-            why.update(walker.why(best.anchors, int(i), name))
+            why.update(walker.why(best.at[:, :2], int(i), name))
     # what the ground forbids is told before what the body cannot do there
     ground, reach = (Status.BELOW_FLOOR, Status.ABOVE_CEILING), Status.OUT_OF_REACH
     told = sorted(why.most_common(), key=lambda item: (item[0][1] not in ground, item[0][1] == reach))
     name, status = told[0][0] if told else (names[0], Status.OUT_OF_REACH)
-    where = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.anchors[:, 0])} m"
-    return _way(line, status, f"No landing spot leads on {where}: {name}: {status}", expanded)
+    where = f"with its anchors at {', '.join(f'{x:.4g}' for x in best.at[:, 0])} m"
+    return _way(line, names, status, f"No landing spot leads on {where}: {name}: {status}", expanded)
 
 
-def _way(line: list[_State], status: Status, reason: str, tried: int) -> Way:
-    moves = [s.move for s in line if s.move is not None]
-    cycles = [before.cycle for before, s in pairwise(line) if s.move is not None]
-    return Way(moves, np.array(cycles, dtype=np.int64), status, reason, tried)
+def _way(line: list[_State], names: list[str], status: Status, reason: str, tried: int) -> Way:
+    moves = [(a, b) for a, b in pairwise(line) if b.landing is not None]
+    cycles = np.array([before.cycle for before, _ in moves], dtype=np.int64)
+    return Way([_move(a, b, names[a.phase]) for a, b in moves], cycles, status, reason, tried)
+
+
+def _move(before: _State, after: _State, name: str = "") -> Moves:
+    return moves_of([before.at], [after.at], [name])
 
 
 def _line(state: _State) -> list[_State]:
@@ -216,32 +225,21 @@ def _mended(walker: Walker, state: _State) -> list[_State]:
     """The states that lead to this one, as far as their moves run into nothing between the places at which moves are
     tried at first either; swings that do are made higher where that helps."""
     line = _line(state)
-    moving = [k for k, s in enumerate(line) if s.move is not None]
+    moving = [k for k, s in enumerate(line) if s.landing is not None]
     if not moving:
         return line
-    sound = walker.sound(Moves.joined([m for s in line if (m := s.move) is not None]), FINAL, True)
+    before, after = [line[k - 1].at for k in moving], [line[k].at for k in moving]
+    sound = walker.sound(moves_of(before, after), FINAL, True)
     for k in (k for k, good in zip(moving, sound, strict=True) if not good):
-        move = line[k].move
-        assert move is not None
-        more = Moves.joined([replace(move, lift=move.lift * share) for share in HIGHER])
-        good = np.flatnonzero(walker.sound(more, FINAL, True))
+        higher = [line[k].at * [1.0, 1.0, share, 1.0] for share in HIGHER]
+        good = np.flatnonzero(walker.sound(moves_of([line[k - 1].at] * len(higher), higher), FINAL, True))
         if not len(good):
             return line[:k]
-        line[k] = replace(line[k], move=replace(move, lift=move.lift * HIGHER[good[0]]))
+        line[k] = replace(line[k], at=higher[good[0]])
     return line
 
 
-def _sound(walker: Walker, states: list[_State]) -> list[_State]:
+def _sound(landings: Landings, states: list[_State]) -> list[_State]:
     """The states whose last move goes with the whole body, and at more places, too."""
-    some = [s.move for s in states if s.move is not None]
-    if not some:
-        return states
-    found = iter(walker.sound(Moves.joined(some), CLOSE))
-    return [s for s in states if s.move is None or next(found)]
-
-
-def _moved(state: _State, offers: Offers, name: str, phases: int) -> _State:
-    """The state after the anchors have moved to what is offered."""
-    after, lift, early = offers.after.copy(), offers.lift[None].copy(), offers.early[None].copy()
-    move = Moves(state.anchors[None], after[None], lift, early, (name,))
-    return _State(after, *state.then(phases), state.made + 1, state.held, state, move)
+    landings.try_all([(s.before.at, s.landing) for s in states if s.before is not None and s.landing is not None])
+    return [s for s in states if s.landing is None or s.landing.sound]

@@ -73,9 +73,7 @@ def even_at(tau: float) -> Even:
 
 
 @lean
-def swung(
-    tau: float, even: Even, dx: float, dz: float, lift: float, early: float
-) -> tuple[float, float, float, float]:
+def swung(tau: float, even: Even, dx: float, dz: float, lift: float, early: float) -> tuple[float, float, float, float]:
     """One anchor of :func:`swing`: ``risen`` and ``landing``, each along and up; ``even``: what swings share there."""
     rise, fall, hump = even
     along, left = rise, fall

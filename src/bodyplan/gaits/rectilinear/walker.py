@@ -14,7 +14,7 @@ from bodyplan.gaits.rectilinear.bounds import Bounds
 from bodyplan.gaits.rectilinear.demands import MET, Demands
 from bodyplan.gaits.rectilinear.landing import land
 from bodyplan.gaits.rectilinear.moves import Moves
-from bodyplan.gaits.rectilinear.offers import Choice, Offers, Ranges, farthest, nearer, places
+from bodyplan.gaits.rectilinear.offers import Choice, Offers, Ranges, farthest, nearer, offers_for, places
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.gaits.rectilinear.terrain import TRIED, Keeps, Places, Steps, places_at, try_moves
 from bodyplan.gaits.rectilinear.track import Track
@@ -23,6 +23,8 @@ from bodyplan.gaits.rectilinear.track import Track
 SPOTS, CLOSER, ROUNDS = 20, 4, 2
 #: where among the spots that go those lie that are offered beside the farthest
 SHARES = (0.8, 0.55, 0.3, 0.0)
+#: how many landings of a stance are found at once: most of them are asked for
+AT_ONCE = 3
 #: places along a move at which it is tried
 PLACES = 25
 #: shapes of a swing: what is added to its lift, in units of how far the ground on its way stands above its ends, and
@@ -88,8 +90,8 @@ class Walker:
         return np.stack([s, self.track.height(s) + self.snake.rest], axis=-1)
 
     def tried(self, moves: Moves, tau: Array, only: int | None = None) -> list[Status]:
-        """The first demand, floor or ceiling that each move runs into at ``tau`` (p,), or ok. ``only``: the
-        one anchor that moves in all of them; what does not move with it has been tried before."""
+        """The first demand, floor or ceiling that each move runs into at ``tau`` (p,), or ok. ``only``: the one
+        anchor that moves in all of them; what does not move with it has been tried before."""
         found = self._into(moves, _places(tau), only, True)
         told = np.arange(len(TRIED))
         if np.isfinite(self.demands.ceiling):  # a ceiling of its own is told in its place among the demands
@@ -155,15 +157,19 @@ class Walker:
             out.update((name, status) for status in (self._plainest(here, i, left) if len(left) else []))
         return out
 
-    def offers(self, here: Array, group: IntArray) -> Offers:
-        """The farthest landing spots of the anchors ``group`` (G,) of ``here`` (N, 2), with lift and shape of swings,
-        those first that make no leg too short for the next move."""
-        found: Offers = farthest(*self._known, _choice(), MET, np.ascontiguousarray(here), group)
-        return found
+    def offers(self, here: Array, group: IntArray) -> tuple[Offers, Array, IntArray]:
+        """The farthest landing spots of the anchors ``group`` (G,) of stances ``here`` (S, N, 2), with lift and shape
+        of swings, those first that make no leg too short for the next move; and the next ones behind. With what is
+        offered the first moves as (S, A, N, 4), s and height m, lift m and how early they rise, and how many (S,)."""
+        offers = offers_for(self.ranges, _choice(), here, len(group))
+        rows, told = np.zeros((len(here), AT_ONCE, here.shape[1], 4)), np.empty(len(here), dtype=np.int64)
+        farthest(*self._known, _choice(), MET, group, offers, rows, told)
+        return offers, rows, told
 
-    def nearer(self, offers: Offers) -> bool:
-        """Offer what lies next behind; False where nothing does."""
-        return bool(nearer(*self._known, _choice(), MET, offers))
+    def nearer(self, offers: Offers, number: int, group: IntArray) -> Array | None:
+        """Offer stance ``number`` what lies next behind (N, 4); None where nothing does."""
+        row = np.empty((offers.here.shape[1], 4))
+        return row if nearer(*self._known, _choice(), MET, group, offers, number, row) else None
 
     @cached_property
     def _known(self) -> tuple[Bounds, Steps, Keeps, Ranges]:
