@@ -8,7 +8,8 @@ import pytest
 
 import bodyplan as bp
 from bodyplan.arrays import Array, IntArray
-from bodyplan.gaits.carry.spins import HALVINGS, PANEL, Hubs
+from bodyplan.gaits.carry.panels import ANGLE, PANEL, RADIUS, RATE, SPEED, Panels
+from bodyplan.gaits.carry.spins import HALVINGS, Hubs
 from bodyplan.gaits.carry.terrain import terrain
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.missions import load_mission
@@ -25,18 +26,17 @@ class Given(Hubs):
     rate: Formula = np.cos
     scales: tuple[float, ...] = (1.0, -2.0, 0.5)
 
-    def speeds(self, wheel: IntArray, when: Array) -> Array:
-        return self.moving(wheel, when)[0]
-
-    def moving(self, wheel: IntArray, when: Array) -> tuple[Array, Array]:
+    def known(self, wheel: IntArray, when: Array, *, gains: bool) -> Array:
         scale = np.asarray(self.scales)[wheel]
         asked.append(len(when))
-        return scale * self.speed(when), scale * self.rate(when)
+        # one contact angle and radius: no contact jumps
+        return np.stack([scale * self.speed(when), scale * self.rate(when), 0.0 * when, 1.0 + 0.0 * when], axis=1)
 
     def turns(self, t: Array) -> Array:
+        wheel = np.arange(len(self.scales))
+        known = self.known(np.tile(wheel, len(t)), np.repeat(t, len(wheel)), gains=True)
         asked.clear()
-        scale = np.asarray(self.scales)
-        return self.turned(t, self.speed(t)[:, None] * scale, self.rate(t)[:, None] * scale)
+        return self.turned(t, known.reshape(len(t), len(wheel), -1))
 
 
 #: numbers of speeds that the last ``turns`` asked for
@@ -49,7 +49,7 @@ def given(speed: Formula, rate: Formula) -> Given:
 
 
 @pytest.mark.parametrize("t", [np.arange(0.0, 5.0, 0.047), np.array([0.0]), np.array([2.0, 2.0, 7.0]), np.array([0.3])])
-def test_smooth_speeds_to_rounding_without_halving(t: Array) -> None:
+def test_smooth_speeds_to_rounding_without_a_cut(t: Array) -> None:
     hubs = given(lambda s: 3.0 + np.sin(2.0 * s), lambda s: 2.0 * np.cos(2.0 * s))
     exact = 3.0 * t + 0.5 * (1.0 - np.cos(2.0 * t))
     np.testing.assert_allclose(hubs.turns(t), exact[:, None] * hubs.scales, rtol=1e-14, atol=1e-13)
@@ -70,7 +70,7 @@ def test_speeds_that_bend(power: int) -> None:
         shortest = 0.047 / 2**HALVINGS
         atol = 1e-11 + 0.2 * shortest ** (power + 1)
         np.testing.assert_allclose(hubs.turns(t), exact[:, None] * hubs.scales, atol=atol)
-        assert sum(asked) < 3 * (4 * len(t) + 9 * (HALVINGS + 1))  # only next to c
+        assert sum(asked) < 3 * (2 * len(t) + 12 * HALVINGS)  # only next to c
 
 
 def test_speeds_that_jump() -> None:
@@ -103,3 +103,46 @@ def test_contacts_that_jump_on_a_map() -> None:
     columns = [motion.robot.joint_index(f"{name}.spin") for name in ("fl", "fr", "r")]
     off = motion.q[:, columns] - finer.q[::20, columns]
     assert np.abs(off).max() < 1e-3
+
+
+#: a floor of narrow valleys with flanks of different slopes: rims hang between both
+VALLEYS = bp.Surface("0.03*sin(40*x) + 0.02*sin(80*x + 1)")
+
+
+def over_valleys(t: Array) -> bp.Motion:
+    gait = bp.Carry([(0.0, 0.0), (1.0, 0.0)], height=0.16, speed=0.1)
+    return bp.plan(ROBOT, gait, VALLEYS, t)
+
+
+def test_contacts_that_jump_are_cut_where_they_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Just before and just after the time that is found the nearest contacts are those two, and as near."""
+    found: list[tuple[Hubs, IntArray, Array, Array]] = []
+    jumps = Hubs.jumps
+
+    def spied(self: Hubs, panels: Panels, inner: Array) -> tuple[Array, Array]:
+        when, sides = jumps(self, panels, inner)
+        sure = np.isfinite(when)
+        found.append((self, panels.wheel[sure], when[sure], sides[sure]))
+        return when, sides
+
+    monkeypatch.setattr(Hubs, "jumps", spied)
+    over_valleys(np.arange(0.0, 4.0, 0.047))
+    ((hubs, wheel, when, sides),) = found
+    assert len(when) > 4
+    assert np.abs(sides[:, 0, RADIUS] - sides[:, 1, RADIUS]).max() < 1e-12
+    assert np.abs(sides[:, 0, ANGLE] - sides[:, 1, ANGLE]).min() > 0.1
+    for side, moment in ((0, when - 1e-7), (1, when + 1e-7)):
+        known = hubs.known(wheel, moment, gains=True)
+        np.testing.assert_allclose(
+            known[:, [SPEED, ANGLE, RADIUS]], sides[:, side][:, [SPEED, ANGLE, RADIUS]], atol=2e-6
+        )
+        np.testing.assert_allclose(known[:, RATE], sides[:, side, RATE], atol=1e-4)
+
+
+def test_angles_over_jumps_are_exact() -> None:
+    """As with panels twenty times shorter, to far less than what a jump in the middle of one would leave."""
+    t = np.arange(0.0, 4.0, 0.047)
+    fine = np.linspace(0.0, t[-1], 20 * (len(t) - 1) + 1)
+    columns = [ROBOT.joint_index(f"{name}.spin") for name in ("fl", "fr", "r")]
+    off = over_valleys(t).q[:, columns] - over_valleys(fine).q[::20, columns]
+    assert np.abs(off).max() < 1e-8

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from bodyplan.gaits.carry.terrain import Steps, Terrain
 from bodyplan.ground.field import Field
 from bodyplan.threads import shared
 
+if TYPE_CHECKING:
+    from bodyplan.gaits.carry.section_kernel import Room
+    from bodyplan.ground.field_kernel import FieldArrays
+
 #: outcomes, as in :mod:`bodyplan.gaits.carry.contact_kernel`
 TOUCHES, LIES_FLAT, NO_GROUND, AXLE_BELOW, UNPROVED, OFF_THE_MAP = range(6)
 #: relative difference up to which Newton's contact is the one that the search found
@@ -22,7 +27,7 @@ RESIDUAL = 1e-11
 #: wheels looked at in one go
 CHUNK = 8192
 #: wheels on a height map from which on threads share the kernels' work
-THREADED = 2048
+THREADED = 320
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,21 @@ def find(ground: Terrain, planes: Planes, start: Array | None = None) -> Contact
     shared(part, len(planes), threaded_from=THREADED if isinstance(ground, Field) else 2 * CHUNK)
     found = [parts[k] for k in sorted(parts)]
     return Contacts(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Contacts)))
+
+
+def follow(ground: Field, planes: Planes, phi: Array, radius: Array) -> Contacts:
+    """The contacts that Newton's method comes to from angles ``phi`` and radii ``radius`` (n,): the nearest ones or
+    not. UNPROVED where it comes to none."""
+    from bodyplan.gaits.carry import contact_kernel
+    from bodyplan.gaits.carry.section_kernel import Room
+
+    land, rows = ground.field_arrays, planes.rows
+    room = Room.of(land, 1)
+    chi, away = phi + planes.lean, np.array(radius)
+    outcome = np.empty(len(planes), dtype=np.int64)
+    contact_kernel.follow(land, rows, room, chi, away, outcome)
+    none = np.full(len(planes), np.nan)
+    return _measured_in_kernel(land, planes, chi, away, none, np.zeros(len(planes), dtype=np.bool_), room, outcome)
 
 
 def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
@@ -142,10 +162,27 @@ def _in_kernels(ground: Field, planes: Planes, start: Array | None) -> Contacts:
         land, rows, planes.lean, feet, sure, settled, edged, SAME, search.CERTAIN, limits, room,
         chi, radius, second, corner, outcome,
     )  # fmt: skip
+    return _measured_in_kernel(land, planes, chi, radius, second, corner, room, outcome)
+
+
+def _measured_in_kernel(
+    land: FieldArrays,
+    planes: Planes,
+    chi: Array,
+    radius: Array,
+    second: Array,
+    corner: BoolArray,
+    room: Room,
+    outcome: IntArray,
+) -> Contacts:
+    """Everything about the contacts at ``chi``, ``radius``, as :func:`_measured`."""
+    from bodyplan.gaits.carry import contact_kernel
+
+    count = len(planes)
     phi, curvature, residual = np.empty(count), np.empty(count), np.empty(count)
     point, normal, hessian = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 2, 2))
     contact_kernel.measure(
-        land, rows, planes.lean, chi, radius, corner, RESIDUAL, room,
+        land, planes.rows, planes.lean, chi, radius, corner, RESIDUAL, room,
         phi, point, normal, curvature, residual, hessian, outcome,
     )  # fmt: skip
     return Contacts(phi, radius, point, normal, curvature, residual, second, corner, hessian, outcome)

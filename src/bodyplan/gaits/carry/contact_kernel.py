@@ -87,6 +87,16 @@ def settle(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def follow(land: FieldArrays, planes: Array, room: Room, chi: Array, radius: Array, outcome: IntArray) -> None:
+    """Newton's contacts of n wheels from ``chi`` rad, ``radius`` m (n,) on, into these."""
+    state = np.empty(8)
+    for k in range(len(planes)):
+        done = _settled(land, planes[k], chi[k], radius[k], room, state)
+        chi[k], radius[k] = state[BEST_CHI], state[BEST_RADIUS]
+        outcome[k] = TOUCHES if done else UNPROVED
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def prove(
     land: FieldArrays,
     planes: Array,

@@ -15,6 +15,7 @@ from bodyplan.gaits.carry.carriage import Carriage, carriage
 from bodyplan.gaits.carry.contact import Contacts
 from bodyplan.gaits.carry.heights import height_of
 from bodyplan.gaits.carry.holding import hold, holding_claims, holding_facts, holding_notes, judged
+from bodyplan.gaits.carry.panels import ANGLE, KNOWN, RADIUS, RATE, SPEED
 from bodyplan.gaits.carry.pose import WheelContact, planes_of, wheel_contact
 from bodyplan.gaits.carry.rates import Rates, rates
 from bodyplan.gaits.carry.report import claims, facts, notes
@@ -144,5 +145,10 @@ def _unwrapped(angle: Array, scale: float) -> Array:
 def spin(wheels: Wheels, land: Terrain, at: Callable[[Array], Carriage], t: Array, rolled: Rolled) -> None:
     """The hubs' turns since t = 0 into ``rolled.q``."""
     columns, signs = [wheel.spin for wheel in wheels], np.array([wheel.turn for wheel in wheels])
-    speeds, gains = rolled.qd[:, columns] * signs, rolled.qdd[:, columns] * signs
-    rolled.q[:, columns] = Hubs(wheels, land, at).turned(t, speeds, gains) / signs
+    known = np.empty((len(t), len(columns), KNOWN))
+    known[:, :, SPEED], known[:, :, RATE] = rolled.qd[:, columns] * signs, rolled.qdd[:, columns] * signs
+    known[:, :, ANGLE], known[:, :, RADIUS] = (
+        v.reshape(len(columns), len(t)).T for v in (rolled.found.phi, rolled.found.radius)
+    )
+    known[:, :, [SPEED, RATE]] = np.nan_to_num(known[:, :, [SPEED, RATE]], nan=0.0, posinf=0.0, neginf=0.0)
+    rolled.q[:, columns] = Hubs(wheels, land, at).turned(t, known) / signs

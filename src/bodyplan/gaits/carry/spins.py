@@ -1,88 +1,35 @@
 """How far hubs turn: their speeds integrated between the times, in panels as short as each wheel needs them.
 
-Four Gauss nodes a panel integrate a speed that is smooth there almost to rounding. Where it is not - the ground, the
-path or a formula bends suddenly, or the contact jumps to another place - that shows at the panel's ends, where the
-accelerations are known, too: the polynomial through the speeds at the nodes and ends has other slopes there. Such a
-panel is halved, for the wheel concerned.
+A panel whose numbers do not go together (:mod:`bodyplan.gaits.carry.panels`) is cut in two, for the wheel concerned: at
+first where the contact jumps from one place of the ground to another, if it does; else in the middle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.gaits.carry import contact
 from bodyplan.gaits.carry.carriage import Carriage
+from bodyplan.gaits.carry.panels import ANGLE, GAUSS, KNOWN, NODES, RADIUS, RATE, SPEED, Panels, edges_of
+from bodyplan.gaits.carry.planes import Planes
 from bodyplan.gaits.carry.pose import planes_of
-from bodyplan.gaits.carry.rates import rates, rolling
+from bodyplan.gaits.carry.rates import Carried, rates, rolling
 from bodyplan.gaits.carry.terrain import Terrain
 from bodyplan.gaits.carry.wheels import Wheels
+from bodyplan.ground.field import Field
 
-#: s of a panel before any is halved, how many there are at most, and how often one is halved
-PANEL, MOST_PANELS, HALVINGS = 0.05, 20_000, 3
-#: rad: a panel with less error than that, or than this share of the largest error of its wheel, is not halved
-ENOUGH, SHARE = 1e-11, 2e-2
-
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-
-
-def _slopes() -> Array:
-    """(2, 6): the slopes at -1 and 1 of the polynomial of degree 5 through values at -1, the nodes and 1."""
-    at, powers = np.concatenate([[-1.0], _NODES, [1.0]]), np.arange(6)
-    ends = np.stack([powers * (-1.0) ** (powers - 1), powers.astype(np.float64)])
-    return np.asarray(np.linalg.solve(np.vander(at, increasing=True).T, ends.T).T)
-
-
-_SLOPES = _slopes()
-#: share of a difference of those slopes that is the error of the integral over (-1, 1), about, next to a bend of the
-#: speed or a jump of it
-_DOUBT = 0.04
-
-
-@dataclass(frozen=True)
-class _Panels:
-    """Panels of n wheels: the ``wheel`` (n,), the number (n,) of the time that each leads ``into``, ``start`` and
-    ``end`` (n,) s, and the speeds rad/s and accelerations rad/s^2 there, (n, 2) each."""
-
-    wheel: IntArray
-    into: IntArray
-    start: Array
-    end: Array
-    speeds: Array
-    rates: Array
-
-    @property
-    def half(self) -> Array:
-        """Half their lengths (n,) s."""
-        return 0.5 * (self.end - self.start)
-
-    @property
-    def nodes(self) -> Array:
-        """Their Gauss nodes (n, 4) s."""
-        return self.start[:, None] + self.half[:, None] * (1.0 + _NODES)
-
-    def doubt(self, inner: Array) -> Array:
-        """About the errors (n,) rad of the integrals of speeds ``inner`` (n, 4) at the nodes."""
-        through = np.concatenate([self.speeds[:, :1], inner, self.speeds[:, 1:]], axis=1)
-        half = self.half
-        off = np.abs(through @ _SLOPES.T - half[:, None] * self.rates).max(axis=1)
-        return np.asarray(_DOUBT * np.abs(half) * off)
-
-    def take(self, index: IntArray) -> _Panels:
-        """Some of the panels, (k,)."""
-        return _Panels(*(getattr(self, f.name)[index] for f in fields(_Panels)))
-
-    def halved(self) -> tuple[_Panels, Array]:
-        """The first halves (n,), then the second ones, with nan for what is not known of the middles (n,) s."""
-        middle, size = 0.5 * (self.start + self.end), len(self.wheel)
-        both = self.take(np.tile(np.arange(size), 2))
-        both.end[:size], both.start[size:] = middle, middle
-        for known in (both.speeds, both.rates):
-            known[:size, 1], known[size:, 0] = np.nan, np.nan
-        return both, middle
+#: how often a panel is cut
+HALVINGS = 3
+#: rad: a panel with less error than that, or than this share of the largest error of its wheel, is not cut
+ENOUGH, SHARE = 1e-11, 1e-2
+#: steps to a jump of the contact; the last one is at most this share of the time in which it is looked for
+_STEPS, _NEAR = 2, 0.1
+#: rad: contacts less apart are one
+_APART = 1e-6
 
 
 @dataclass(frozen=True)
@@ -93,82 +40,149 @@ class Hubs:
     land: Terrain
     at: Callable[[Array], Carriage]
 
-    def speeds(self, wheel: IntArray, when: Array) -> Array:
-        """Speeds (n,) rad/s of hubs ``wheel`` (n,) about their axles at times ``when`` (n,) s; 0 where they do not
-        touch."""
-        body, index = self._carried(wheel, when)
-        found = contact.find(self.land, planes_of(self.wheels, body.position, body.turn.matrix).take(index))
-        made = rolling(found, body.carried(self.wheels).take(index))
-        return _finite(made, found.outcome == contact.TOUCHES)
+    def known(self, wheel: IntArray, when: Array, *, gains: bool) -> Array:
+        """What is known (n, KNOWN) of wheels ``wheel`` (n,) at times ``when`` (n,) s; speeds and accelerations 0 where
+        they do not touch; accelerations only with ``gains``."""
+        planes, carried = self._carried(wheel, when)
+        found = contact.find(self.land, planes)
+        out, touches = np.zeros((len(wheel), KNOWN)), found.outcome == contact.TOUCHES
+        out[:, ANGLE], out[:, RADIUS] = found.phi, found.radius
+        if gains:
+            made = rates(self.land, found, carried)
+            out[:, SPEED], out[:, RATE] = _finite(made.rolling, touches), _finite(made.rolling_rate, touches)
+        else:
+            out[:, SPEED] = _finite(rolling(found, carried), touches)
+        return out
 
-    def moving(self, wheel: IntArray, when: Array) -> tuple[Array, Array]:
-        """Those speeds, and the accelerations (n,) rad/s^2."""
-        body, index = self._carried(wheel, when)
-        found = contact.find(self.land, planes_of(self.wheels, body.position, body.turn.matrix).take(index))
-        made = rates(self.land, found, body.carried(self.wheels).take(index))
-        touches = found.outcome == contact.TOUCHES
-        return _finite(made.rolling, touches), _finite(made.rolling_rate, touches)
-
-    def _carried(self, wheel: IntArray, when: Array) -> tuple[Carriage, IntArray]:
-        """The body at the times, each once, and where of all wheels at those times the ones asked for are."""
+    def _carried(self, wheel: IntArray, when: Array) -> tuple[Planes, Carried]:
+        """The wheels' planes and how they are carried; the body is asked once a time."""
         times, which = np.unique(when, return_inverse=True)
-        return self.at(times), wheel * len(times) + which
+        body, index = self.at(times), wheel * len(times) + which
+        planes = planes_of(self.wheels, body.position, body.turn.matrix)
+        return planes.take(index), body.carried(self.wheels).take(index)
 
-    def turned(self, t: Array, speeds: Array, rates: Array) -> Array:
-        """Angles (T, k) rad by which k hubs have turned from t = 0 to the times ``t`` (T,) s, from their ``speeds``
-        and accelerations ``rates`` (T, k) at those times."""
-        panels, angle = self._panels(t, speeds, rates), np.zeros((len(self.wheels), len(t)))
-        if not len(panels.wheel):
+    def turned(self, t: Array, known: Array) -> Array:
+        """Angles (T, k) rad by which k hubs have turned from t = 0 to the times ``t`` (T,) s, from what is ``known``
+        (T, k, KNOWN) at those times."""
+        panels, angle = self._panels(t, known), np.zeros((len(self.wheels), len(t)))
+        if not len(panels):
             return np.asarray(angle.T)
-        inner = self.speeds(np.repeat(panels.wheel, 4), panels.nodes.ravel()).reshape(-1, 4)
-        for left in range(HALVINGS, -1, -1):
-            doubt, worst = panels.doubt(inner), np.zeros(len(self.wheels))
+
+        def add(some: Panels, turns: Array) -> None:
+            np.add.at(angle, (some.wheel, some.into), turns)
+
+        inner = self._inner(panels, NODES)
+        doubt = panels.doubt_in_a_row(inner[:, :, SPEED])
+        for left in range(HALVINGS - 1, -1, -1):
+            worst = np.zeros(len(self.wheels))
             np.maximum.at(worst, panels.wheel, doubt)
-            more = (doubt > np.maximum(ENOUGH, SHARE * worst[panels.wheel])) & (left > 0)
-            done, part = ~more, (inner @ _WEIGHTS) * panels.half
-            np.add.at(angle, (panels.wheel[done], panels.into[done]), part[done])
-            if not more.any():
+            enough = doubt <= np.maximum(ENOUGH, SHARE * worst[panels.wheel])
+            done, rest = np.flatnonzero(enough), np.flatnonzero(~enough)
+            add(panels.take(done), panels.integral(inner[:, :, SPEED])[done])
+            panels, inner = panels.take(rest), inner[rest]
+            if not len(panels):
                 break
-            panels, inner = self._halved(panels.take(np.flatnonzero(more)))
+            if left:
+                when, sides = self.jumps(panels, inner) if left == HALVINGS - 1 else _nowhere(len(panels))
+                panels, inner = self._cut(panels, when, sides)
+                doubt = panels.doubt(inner[:, :, SPEED])
+            else:
+                # as short as they get: without the ends, at which a speed may bend or jump
+                halves = panels.cut(panels.middle, panels.ends)
+                add(halves, halves.integral_of_speeds(self._inner(halves, GAUSS)[:, :, SPEED]))
         return np.asarray(np.cumsum(angle, axis=1).T)
 
-    def _halved(self, panels: _Panels) -> tuple[_Panels, Array]:
-        """Halves of n panels, (2 n,), and the speeds (2 n, 4) at their nodes."""
-        size, (halves, middle) = len(panels.wheel), panels.halved()
-        wheel, when = np.repeat(halves.wheel, 4), halves.nodes.ravel()
-        speed, rate = self.moving(np.append(wheel, panels.wheel), np.append(when, middle))
-        for known, new in ((halves.speeds, speed), (halves.rates, rate)):
-            known[:size, 1] = known[size:, 0] = new[len(when) :]
-        return halves, speed[: len(when)].reshape(-1, 4)
+    def _inner(self, panels: Panels, at: Array) -> Array:
+        """What is known (n, k, KNOWN) at nodes ``at`` (k,), without accelerations."""
+        made = self.known(np.repeat(panels.wheel, len(at)), panels.nodes(at).ravel(), gains=False)
+        return made.reshape(len(panels), len(at), KNOWN)
 
-    def _panels(self, t: Array, speeds: Array, rates: Array) -> _Panels:
-        """The panels before any is halved: from 0 to the first time and between the others, in as many equal parts as
-        it takes."""
-        edges, into = _edges(t)
+    def _cut(self, panels: Panels, when: Array, sides: Array) -> tuple[Panels, Array]:
+        """n panels as two of each (2 n,), cut at times ``when`` (n,) s where ``sides`` (n, 2, KNOWN) are known just
+        before and after, or, where that is nan, in the middle; and what is known (2 n, 2, KNOWN) at their nodes."""
+        halved = np.flatnonzero(np.isnan(when))
+        middle = panels.middle[halved]
+        when[halved] = middle
+        parts = panels.cut(when, sides)
+        wheel, nodes = np.repeat(parts.wheel, 2), parts.nodes(NODES).ravel()
+        made = self.known(np.append(wheel, panels.wheel[halved]), np.append(nodes, middle), gains=len(halved) > 0)
+        parts.ends[halved, 1] = parts.ends[len(panels) + halved, 0] = made[len(nodes) :]
+        return parts, made[: len(nodes)].reshape(len(parts), 2, KNOWN)
+
+    def jumps(self, panels: Panels, inner: Array) -> tuple[Array, Array]:
+        """Times (n,) s at which contacts jump within n panels, nan where no jump is found, and what is known (n, 2,
+        KNOWN) just before and after; ``inner`` (n, 2, KNOWN) is known at the nodes.
+
+        Of the ends and nodes, all of them nearest contacts, two neighbours are on either side of the largest jump: both
+        contacts are followed to the time at which they are as near. Others are not looked at there: whether one is
+        nearer shows at the nodes of the parts.
+        """
+        (when, sides), land = _nowhere(len(panels)), self.land
+        if not isinstance(land, Field):
+            return when, sides
+        places = np.concatenate([panels.ends[:, :1], inner, panels.ends[:, 1:]], axis=1)
+        times = np.concatenate([panels.start[:, None], panels.nodes(NODES), panels.end[:, None]], axis=1)
+        apart = np.abs(np.diff(places[:, :, ANGLE], axis=1))
+        some = np.flatnonzero(apart.max(axis=1) > _APART)
+        first = apart[some].argmax(axis=1)
+        low, high = times[some, first], times[some, first + 1]
+        at, found = 0.5 * (low + high), np.stack([places[some, first], places[some, first + 1]], axis=1)
+        for left in range(_STEPS - 1, -1, -1):
+            if not len(some):
+                break
+            found, step = self._nearer(land, panels.wheel[some], at, found)
+            at = at + step
+            good = np.isfinite(found).all(axis=(1, 2)) & (low < at) & (at < high)
+            good &= np.abs(found[:, 1, ANGLE] - found[:, 0, ANGLE]) > _APART
+            good &= (np.abs(step) <= _NEAR * (high - low)) | (left > 0)
+            some, low, high, at, found = some[good], low[good], high[good], at[good], found[good]
+        when[some], sides[some] = at, found
+        return when, sides
+
+    def _nearer(self, land: Field, wheel: IntArray, when: Array, near: Array) -> tuple[Array, Array]:
+        """Two contacts of each of n wheels at times ``when`` (n,) s, from ``near`` (n, 2, KNOWN) on: what is known of
+        them when they are as near, a step (n,) s later; nan where they do not come to that."""
+        planes, carried = self._carried(np.repeat(wheel, 2), np.repeat(when, 2))
+        found = contact.follow(land, planes, near[:, :, ANGLE].ravel(), near[:, :, RADIUS].ravel())
+        made = rates(land, found, carried)
+        with np.errstate(all="ignore"):
+            gap, grows, gains = (
+                v[:, 0] - v[:, 1] for v in (a.reshape(-1, 2) for a in (found.radius, made.radius, made.radius_rate))
+            )
+            # Halley's step: of the parabola through the gap
+            step = -gap / grows
+            step = np.where(grows > 0.0, -gap / (grows + 0.5 * gains * step), np.nan)
+            at = np.repeat(step, 2)
+            columns = [
+                made.rolling + made.rolling_rate * at,
+                made.rolling_rate,
+                found.phi + made.angle * at,
+                found.radius + made.radius * at,
+            ]
+        return np.stack(columns, axis=1).reshape(-1, 2, KNOWN), step
+
+    def _panels(self, t: Array, known: Array) -> Panels:
+        """The panels before any is cut: from 0 to the first time and between the others, in as many equal parts as it
+        takes."""
+        edges, into = edges_of(t)
         count, size = len(self.wheels), len(into)
-        known = np.isin(edges, t)
-        ends = np.empty((2, count, len(edges)))
-        ends[:, :, known] = _finite(np.stack([speeds, rates])[:, np.searchsorted(t, edges[known])].transpose(0, 2, 1))
-        other = edges[~known]
+        given = np.isin(edges, t)
+        ends = np.empty((count, len(edges), KNOWN))
+        ends[:, given] = known[np.searchsorted(t, edges[given])].transpose(1, 0, 2)
+        other = edges[~given]
         if len(other):
-            made = self.moving(np.repeat(np.arange(count), len(other)), np.tile(other, count))
-            ends[:, :, ~known] = np.stack(made).reshape(2, count, -1)
-        both = np.stack([ends[:, :, :-1], ends[:, :, 1:]], axis=-1).reshape(2, -1, 2)
+            made = self.known(np.repeat(np.arange(count), len(other)), np.tile(other, count), gains=True)
+            ends[:, ~given] = made.reshape(count, -1, KNOWN)
+        both = np.stack([ends[:, :-1], ends[:, 1:]], axis=2).reshape(-1, 2, KNOWN)
         wheel = np.repeat(np.arange(count), size)
-        return _Panels(wheel, np.tile(into, count), np.tile(edges[:-1], count), np.tile(edges[1:], count), *both)
+        return Panels(wheel, np.tile(into, count), np.tile(edges[:-1], count), np.tile(edges[1:], count), both)
 
 
-def _edges(t: Array) -> tuple[Array, IntArray]:
-    """Ends (p + 1,) s of panels from 0 over all times, and the number (p,) of the time that each one leads to."""
-    times = np.concatenate([[0.0], t]) if t[0] != 0.0 else t
-    longest = max(PANEL, float(t[-1]) / MOST_PANELS)
-    counts = np.maximum(np.ceil(np.abs(np.diff(times)) / longest * (1.0 - 1e-9)), 1.0).astype(np.int64)
-    which = np.repeat(np.arange(len(counts)), counts)
-    part = np.arange(len(which)) - (np.cumsum(counts) - counts)[which]
-    starts = times[which] + part * (np.diff(times) / counts)[which]
-    return np.append(starts, times[-1]), which + len(t) - len(counts)
+def _nowhere(size: int) -> tuple[Array, Array]:
+    """No times (n,), and nothing known (n, 2, KNOWN) at them."""
+    return np.full(size, np.nan), np.zeros((size, 2, KNOWN))
 
 
-def _finite(values: Array, sure: BoolArray | bool = True) -> Array:
+def _finite(values: Array, sure: BoolArray) -> Array:
     """The values where they are finite and ``sure``, else 0."""
     return np.where(np.isfinite(values) & sure, values, 0.0)
