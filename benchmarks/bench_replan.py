@@ -17,6 +17,7 @@ from time import perf_counter
 
 from bodyplan.errors import BodyplanError
 from bodyplan.missions import load_mission, ready_missions
+from bodyplan.show.live import memory
 from bodyplan.show.live.parameters import Parameter, Scale, changed, parameters_of
 from bodyplan.show.live.session import Source
 from bodyplan.viewing import mission_source
@@ -56,6 +57,8 @@ def main() -> None:
     print(f"{'mission':22} {'few: median':>12} {'worst':>8}  {'all: median':>12}  slowest slider")
     for name in parser.parse_args().missions or ready_missions():
         source = mission_source(load_mission(name))
+        # as the viewer does when it starts
+        memory.hold()
         few, every = one(source, True), one(source, False)
         slowest = max(few, key=lambda k: few[k])
         middle, worst = statistics.median(few.values()), few[slowest]

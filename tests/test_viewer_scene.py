@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import signal
@@ -221,6 +222,7 @@ def test_show_serves_and_opens(monkeypatch: pytest.MonkeyPatch) -> None:
     viewer = bp.show(snake_motion(), snake_trial(), port=0, block=False)
     assert viewer.url.startswith("http://127.0.0.1:") and opened == [viewer.url]
     assert viewer.session.state.trial is not None and viewer.url in repr(viewer)
+    assert gc.get_freeze_count() > 1000
     viewer.stop()
     viewer.stop()
     assert "stopped" in repr(viewer)

@@ -7,6 +7,7 @@ import webbrowser
 from time import monotonic
 from typing import Any
 
+from bodyplan.show.live import memory
 from bodyplan.show.live import server as web
 from bodyplan.show.live.panel import Panel
 from bodyplan.show.live.session import Session, Source, State
@@ -43,6 +44,7 @@ class Viewer:
             self.session.stop()
             web.stop(self.server)
             raise
+        memory.hold()
         self._clock = threading.Thread(target=self._run, name="bodyplan clock", daemon=True)
         self._clock.start()
 
@@ -71,6 +73,7 @@ class Viewer:
         if threading.current_thread() is not self._clock:
             self._clock.join(timeout=2.0)
         web.stop(self.server)
+        memory.release()
 
     def __enter__(self) -> Viewer:
         return self

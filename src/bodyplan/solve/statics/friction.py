@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array
 from bodyplan.errors import Status
 from bodyplan.solve.statics.cones import Family, ratios
-from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, Memory, Parts, balances_of
+from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, Memory, Parts, balances_of
 from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import at_least_factor
 from bodyplan.solve.statics.outcome import Outcome, shaped
@@ -76,7 +76,7 @@ def required_friction(
             reasons[i] = "no contacts that only push hold it, whatever their friction"
             attained[i] = False
         elif found.attained and forces:
-            solved = at_least_factor(least.balances[i], least.family(i), found)
+            solved = at_least_factor(least.balance(i), least.family(i), found)
             x[i] = found.x if solved is None else solved.x
         if np.isfinite(found.s) and not found.exact:
             status[i] = Status.NOT_CONVERGED.value
@@ -97,13 +97,21 @@ class LeastFriction:
     def __init__(self, loads: Loads) -> None:
         self.loads, self._equations = loads, loads.equations()
         self._parts = Parts.of(self._equations)
-        self.balances = balances_of(self._equations, loads.load, self._parts)
+        self._balances: dict[int, Balance] = {}
         self._memories: dict[int, tuple[Memory, float]] = {}
 
     @staticmethod
     def of(points: ArrayLike, normals: ArrayLike, com: ArrayLike, weight: ArrayLike) -> LeastFriction:
         """For arguments of :func:`required_friction`."""
         return LeastFriction(Loads.of(points, normals, com, weight, None, None))
+
+    def balance(self, i: int) -> Balance:
+        """The equations of item i."""
+        if i not in self._balances:
+            one = slice(i, i + 1)
+            parts = Parts(*(values[one] for values in self._parts))
+            self._balances[i] = balances_of(self._equations[one], self.loads.load[one], parts)[0]
+        return self._balances[i]
 
     def family(self, i: int) -> Family:
         """The cones of item i: one coefficient for all contacts."""
@@ -112,7 +120,7 @@ class LeastFriction:
 
     def at(self, i: int) -> Factor:
         """The least coefficient of item i, whose load is not zero."""
-        loads, held = self.loads, self.balances[i]
+        loads, held = self.loads, self.balance(i)
         if held.left > ROUNDING:
             return Factor(np.inf, np.full((loads.contacts, 3), np.nan), np.zeros(len(held.b)), loads.touching[i])
         start: Start | None = None
