@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import bodyplan as bp
 from bodyplan.solve.statics.cones import ratios
-from bodyplan.solve.statics.equilibrium import Loads, Parts
+from bodyplan.solve.statics.equilibrium import Loads
 from bodyplan.solve.statics.friction import CLOSE, LeastFriction
 from bodyplan.solve.statics.projection_kernel import project
 from statics_cases import cast, rough
@@ -26,13 +26,17 @@ def batch(seed: int, k: int, size: int, along: bool) -> tuple[np.ndarray, np.nda
     return points + 0.0 * wave, normals + bend[0] * np.sin(wave) + bend[1] * np.cos(2.0 * wave), np.tile(com, (size, 1))
 
 
+def least_of(points: np.ndarray, normals: np.ndarray, com: np.ndarray, weight: float) -> LeastFriction:
+    return LeastFriction(Loads.of(points, normals, com, weight, None, None))
+
+
 @pytest.mark.parametrize("along", [False, True])
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 100), k=st.integers(3, 6))
 def test_it_is_the_largest_of_all(along: bool, seed: int, k: int) -> None:
     points, normals, com = batch(seed, k, 24, along)
     every = bp.solve.required_friction(points, normals, com, forces=False).mu
-    got = LeastFriction.of(points, normals, com, 1.0).largest(np.full(24, np.inf))
+    got = least_of(points, normals, com, 1.0).largest(np.full(24, np.inf))
     assert np.nanmax(got) == pytest.approx(every.max(), rel=1e-11, abs=1e-12)
     known = np.isfinite(got)
     np.testing.assert_allclose(got[known], every[known], rtol=1e-10, atol=1e-12)
@@ -43,7 +47,7 @@ def test_it_is_the_largest_of_all(along: bool, seed: int, k: int) -> None:
 def test_bounds_that_are_given_spare_work() -> None:
     points, normals, com = batch(5, 4, 30, False)
     every = bp.solve.required_friction(points, normals, com, forces=False).mu
-    got = LeastFriction.of(points, normals, com, 1.0).largest(every * (1.0 + 1e-9))
+    got = least_of(points, normals, com, 1.0).largest(every * (1.0 + 1e-9))
     assert np.flatnonzero(np.isfinite(got)).tolist() == [int(every.argmax())]
     assert np.nanmax(got) == pytest.approx(every.max(), rel=1e-11)
 
@@ -51,12 +55,12 @@ def test_bounds_that_are_given_spare_work() -> None:
 def test_one_that_tips_over_decides() -> None:
     points, normals, com = batch(1, 3, 10, True)
     points[6, :, 2], normals[6], com[6] = 0.0, [0.0, 0.0, 1.0], [5.0, 0.0, 0.3]
-    got = LeastFriction.of(points, normals, com, 1.0).largest(np.full(10, np.inf))
+    got = least_of(points, normals, com, 1.0).largest(np.full(10, np.inf))
     assert np.nanmax(got) == np.inf
 
 
 def test_of_no_items_there_is_none() -> None:
-    none = LeastFriction.of(np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)), 1.0)
+    none = least_of(np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)), 1.0)
     assert none.largest(np.zeros(0)).shape == (0,)
 
 
@@ -67,7 +71,7 @@ def test_projected_forces_balance_and_bound(seed: int, k: int, mu: float, rounds
     points, normals, com = cast(seed, k)
     touching = np.random.default_rng(seed).uniform(size=k) > 0.2
     loads = Loads.of(points, normals, com, 1.0, None, touching)
-    equations, found = loads.equations(), Parts.of(loads.equations())
+    equations, found = loads.equations, loads.parts
     x, bound = np.zeros((1, 3 * k)), np.full(1, np.inf)
     project(equations, found.inverse, loads.load, loads.touching, mu, rounds, x, bound)
     balances = np.abs(equations[0] @ x[0] + loads.load[0]).max() < 1e-10
@@ -84,11 +88,11 @@ def test_projection_finds_what_stands_with_room_to_spare() -> None:
     points, normals, com = batch(11, 4, 60, False)
     every = bp.solve.required_friction(points, normals, com, forces=False).mu
     loads = Loads.of(points, normals, com, 1.0, None, None)
-    inverse = Parts.of(loads.equations()).inverse
+    inverse = loads.parts.inverse
     within = 0
     for i, enough in enumerate(1.5 * every):
         x, bound, one = np.zeros((1, 12)), np.full(1, np.inf), slice(i, i + 1)
-        project(loads.equations()[one], inverse[one], loads.load[one], loads.touching[one], enough, 100, x, bound)
+        project(loads.equations[one], inverse[one], loads.load[one], loads.touching[one], enough, 100, x, bound)
         assert bound[0] >= every[i] * (1.0 - 1e-10)
         within += bool(bound[0] <= enough * (1.0 + 1e-6))
     assert within > 45

@@ -15,7 +15,7 @@ from bodyplan.gaits.carry.carriage import Carriage
 from bodyplan.gaits.carry.wheels import Wheels
 from bodyplan.ground.base import Ground
 from bodyplan.motion import Claim
-from bodyplan.solve.statics.friction import LeastFriction
+from bodyplan.solve.statics.equilibrium import Loads
 
 if TYPE_CHECKING:
     from bodyplan.gaits.carry.motion import Rolled
@@ -59,20 +59,21 @@ def hold(wheels: Wheels, ground: Ground, body: Carriage, rolled: Rolled, ok: Boo
     ratio, required = np.full((size, len(wheels)), np.nan), np.full(size, np.nan)
     unknown = ""
     if len(rows):
-        from bodyplan.solve import contact_forces
+        from bodyplan.solve.statics.forces import forces_of
+        from bodyplan.solve.statics.friction import LeastFriction
 
         some = stance.take(rows)
+        loads = Loads.of(some.points, some.normals, some.center, some.weight, None, None)
         try:
-            solved = contact_forces(some.points, some.normals, some.center, some.weight, friction)
+            solved = forces_of(loads, friction)
             found[rows], status[rows], ratio[rows] = solved.forces, solved.status, solved.ratio
-            required[rows] = np.where(np.isfinite(solved.needed), solved.needed, np.nan)
         except MissingExtraError as error:
             return f"No forces and torques: {error}"
+        required[rows] = np.where(np.isfinite(solved.needed), solved.needed, np.nan)
         try:
-            stood = rows[status[rows] == Status.OK.value]
-            some = stance.take(stood)
-            least = LeastFriction.of(some.points, some.normals, some.center, some.weight)
-            required[stood] = least.largest(ratio[stood].max(axis=1))
+            stood = solved.status == Status.OK.value
+            least = LeastFriction(loads).largest(np.where(stood, solved.ratio.max(axis=1), -np.inf))
+            required[rows] = np.where(stood, least, required[rows])
         except MissingExtraError as error:
             unknown = f"The least friction that holds the body is not known: {error}"
     held = np.isfinite(found).all(axis=(1, 2))

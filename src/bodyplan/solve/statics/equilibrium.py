@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -61,12 +62,18 @@ class Loads:
     def contacts(self) -> int:
         return int(self.arms.shape[1])
 
+    @cached_property
     def equations(self) -> Array:
         """(n, 6, 3k): what unit components of the contact forces add to the force and the moment."""
         turned = np.cross(self.arms[..., :, None, :], np.swapaxes(self.frames, -1, -2))
         rows = np.concatenate([self.frames, np.swapaxes(turned, -1, -2)], axis=-2)
         rows = np.where(self.touching[..., None, None], rows, 0.0)
         return np.moveaxis(rows, 1, 2).reshape(self.count, 6, 3 * self.contacts)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Singular parts of the equations."""
+        return Parts.of(self.equations)
 
     def newtons(self, x: Array) -> Array:
         """(n, k, 3) N in the world, of components (n, k, 3)."""
@@ -83,7 +90,7 @@ class Loads:
 
     def left_over(self, x: Array) -> Array:
         """(n,): the largest entry of force and moment that components (n, k, 3) leave over, as a share of the load."""
-        rest = np.einsum("nij,nj->ni", self.equations(), x.reshape(self.count, 3 * self.contacts)) + self.load
+        rest = np.einsum("nij,nj->ni", self.equations, x.reshape(self.count, 3 * self.contacts)) + self.load
         return np.asarray(np.abs(rest).max(axis=-1))
 
     @staticmethod

@@ -68,22 +68,26 @@ def contact_forces(
 
     Raises InputError for shapes that do not go together, a normal of length zero, a negative weight or friction.
     """
+    given = friction(mu, _count(points))
+    loads = Loads.of(points, normals, com, weight, wrench, touching, ("mu", given.shape[:-1]))
+    return forces_of(loads, given, objective)
+
+
+def forces_of(loads: Loads, mu: Array, objective: str = "min_norm") -> ContactForces:
+    """:func:`contact_forces` of loads with coefficients ``mu`` (..., k), whose shape is part of theirs."""
     if objective not in OBJECTIVES:
         raise UnknownNameError("objective", objective, OBJECTIVES)
-    k = _count(points)
-    given = friction(mu, k)
-    loads = Loads.of(points, normals, com, weight, wrench, touching, ("mu", given.shape[:-1]))
-    flat = np.broadcast_to(given, (*loads.shape, k)).reshape(-1, k)
+    k = loads.contacts
+    flat = np.broadcast_to(mu, (*loads.shape, k)).reshape(-1, k)
     x = smallest_free(loads, flat)
     n = loads.count
     status = np.full(n, Status.OK.value, dtype="<U16")
     reasons, needed = np.full(n, "", dtype=object), np.full(n, np.nan)
     memory: tuple[Memory, float] | None = None
-    equations = loads.equations()
     for i in range(n):
         if loads.force[i] == 0.0 or (objective == "min_norm" and np.isfinite(x[i, 0, 0])):
             continue
-        held, on = balance(equations[i], loads.load[i]), loads.touching[i]
+        held, on = balance(loads.equations[i], loads.load[i]), loads.touching[i]
         start = None if memory is None else (*loads.recall(i, held, memory[0]), memory[1])
         memory = None
         if objective == "min_ratio" and held.left <= ROUNDING:
@@ -112,8 +116,7 @@ def contact_forces(
 
 def smallest_free(loads: Loads, mu: Array) -> Array:
     """(n, k, 3) components of the smallest forces where these are within all cones mu (n, k), else nan."""
-    inverse = np.linalg.pinv(loads.equations(), rcond=1e-10)
-    x = -(inverse @ loads.load[..., None])[..., 0].reshape(loads.count, loads.contacts, 3)
+    x = -np.einsum("nij,ni->nj", loads.parts.inverse, loads.load).reshape(loads.count, loads.contacts, 3)
     kind = np.where(loads.touching, np.where(mu > 0.0, CONE, RAY), 0)
     ray = np.broadcast_to([1.0, 0.0, 0.0], x.shape)
     rounding = 1e-14 * np.abs(x).max(axis=(1, 2))

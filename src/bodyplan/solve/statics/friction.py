@@ -95,22 +95,16 @@ class LeastFriction:
     that is known, which saves work and decides nothing."""
 
     def __init__(self, loads: Loads) -> None:
-        self.loads, self._equations = loads, loads.equations()
-        self._parts = Parts.of(self._equations)
+        self.loads = loads
         self._balances: dict[int, Balance] = {}
         self._memories: dict[int, tuple[Memory, float]] = {}
-
-    @staticmethod
-    def of(points: ArrayLike, normals: ArrayLike, com: ArrayLike, weight: ArrayLike) -> LeastFriction:
-        """For arguments of :func:`required_friction`."""
-        return LeastFriction(Loads.of(points, normals, com, weight, None, None))
 
     def balance(self, i: int) -> Balance:
         """The equations of item i."""
         if i not in self._balances:
             one = slice(i, i + 1)
-            parts = Parts(*(values[one] for values in self._parts))
-            self._balances[i] = balances_of(self._equations[one], self.loads.load[one], parts)[0]
+            parts = Parts(*(values[one] for values in self.loads.parts))
+            self._balances[i] = balances_of(self.loads.equations[one], self.loads.load[one], parts)[0]
         return self._balances[i]
 
     def family(self, i: int) -> Family:
@@ -149,7 +143,7 @@ class LeastFriction:
                 bound = np.fmin(bound, self.bounds(i, found.x))
             if found.s > most:
                 most = found.s
-                args = self._equations, self._inverse, self.loads.load, self.loads.touching
+                args = self.loads.equations, self._inverse, self.loads.load, self.loads.touching
                 project(*args, most, ROUNDS, x, bound)
         return known
 
@@ -160,10 +154,10 @@ class LeastFriction:
         with np.errstate(all="ignore"):
             here = (np.swapaxes(self.loads.frames, -1, -2) @ world)[..., 0] / self.loads.force[:, None, None]
             flat = here.reshape(len(here), -1)
-            rest = np.einsum("nij,nj->ni", self._equations, flat) + self.loads.load
+            rest = np.einsum("nij,nj->ni", self.loads.equations, flat) + self.loads.load
             mended = (flat - np.einsum("nij,ni->nj", self._inverse, rest)).reshape(here.shape)
         return np.where(np.isfinite(mended).all(axis=(1, 2)), ratios(mended).max(axis=1), np.inf)
 
     @cached_property
     def _inverse(self) -> Array:
-        return self._parts.inverse
+        return self.loads.parts.inverse

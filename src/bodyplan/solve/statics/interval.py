@@ -73,7 +73,7 @@ def torque_interval(
     x = np.full((2, n, m, k, 3), np.nan)
     status = np.full(n, Status.OK.value, dtype="<U16")
     reasons = np.full(n, "", dtype=object)
-    equations = loads.equations()
+    equations = loads.equations
     for i in range(n):
         held = balance(equations[i], loads.load[i])
         solved = solve_item(held, flat[i], loads.touching[i])
