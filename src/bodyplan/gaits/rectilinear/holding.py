@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from bodyplan.arrays import Array, BoolArray
+from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.fitting.mechanism import PITCH, mechanism
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.robot.masses import center_from_poses, mass_points
 from bodyplan.spatial import rotate
 
 GRAVITY = 9.81
+#: singular values below this share of the largest are rounding
+SINGULAR = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,40 +37,65 @@ def holding(snake: InchingSnake, poses: Array, along: Array, anchors: Array, sta
     standing anchors leave no choice. With more, the loads are those that hold with the least sum of squared torques,
     none of them pulling: what equally stiff servos settle at. None for a robot without masses.
     """
-    robot = snake.robot
-    frames, masses, centres = mass_points(robot)
-    if not len(frames) or not masses.sum() > 0.0:
+    robot, lever = snake.robot, _levers(snake)
+    if lever is None:
         return None
-    places = (poses[:, frames, :3] + rotate(poses[:, frames, 3:], centres)) @ along
+    places = (poses[:, lever.frames, :3] + rotate(poses[:, lever.frames, 3:], lever.centres)) @ along
     center = center_from_poses(robot, poses) @ along
-    made = mechanism(robot)
-    pitch = made.joints_of(PITCH)
-    at_rest = made.places[made.joint_place[pitch]]
-    rest = robot.forward(np.zeros(robot.n))
-    joint_frames = [int(np.argmin(np.abs(rest.positions[:, 0] - x))) for x in at_rest]
-    joints = poses[:, joint_frames, :3] @ along
-    body_rest = rest.positions[frames, 0] + rotate(rest.array[frames, 3:], centres)[:, 0]
-    ahead = body_rest[None, :] > at_rest[:, None]
-    anchor_rest = made.places[made.joint_place[snake.columns[0::2]]]
-    # an anchor's load acts on the link behind its joint
-    loaded = anchor_rest[None, :] > at_rest[:, None] + 1e-12 * made.length
-    weights = masses * GRAVITY
+    joints = poses[:, lever.joints, :3] @ along
     # torque that a joint must give, nose-up, to carry what is ahead of it
-    weight = np.einsum("jb,tjb->tj", ahead * weights, places[:, None, :] - joints[:, :, None])
-    arms = np.where(loaded, anchors[:, None, :] - joints[:, :, None], 0.0)
-    total = float(weights.sum())
+    weight = np.einsum("jb,tjb->tj", lever.ahead, places[:, None, :] - joints[:, :, None])
+    arms = np.where(lever.loaded, anchors[:, None, :] - joints[:, :, None], 0.0)
     loads = np.zeros(anchors.shape)
     for pattern in np.unique(standing, axis=0):
         rows = np.flatnonzero((standing == pattern).all(axis=1))
         feet = np.flatnonzero(pattern)
         if len(feet):
             loads[np.ix_(rows, feet)] = _loads(
-                anchors[rows][:, feet], center[rows], total, weight[rows], arms[rows][:, :, feet]
+                anchors[rows][:, feet], center[rows], lever.total, weight[rows], arms[rows][:, :, feet]
             )
     torque = weight - np.einsum("tjk,tk->tj", arms, loads)
     torques = np.zeros((len(center), robot.n))
-    torques[:, pitch] = -made.gain[pitch] * torque
+    torques[:, lever.pitch] = -lever.gain * torque
     return Holding(loads, torques, center, support_margin(anchors, center, standing))
+
+
+@dataclass(frozen=True, eq=False)
+class _Levers:
+    """What pulls at which of the J pitch joints, whatever the pose: bodies with their ``centres`` (B, 3) m in their
+    ``frames`` (B,); frames of the ``joints`` (J,); ``ahead`` (J, B) N, the weight of those ahead of a joint; ``loaded``
+    (J, N): anchors that are; columns ``pitch`` (J,) of q with their ``gain``; the ``total`` N."""
+
+    frames: IntArray
+    centres: Array
+    joints: IntArray
+    ahead: Array
+    loaded: BoolArray
+    pitch: IntArray
+    gain: Array
+    total: float
+
+
+@lru_cache(maxsize=16)
+def _levers(snake: InchingSnake) -> _Levers | None:
+    """Once for all plans with a snake; None where it has no masses."""
+    robot = snake.robot
+    frames, masses, centres = mass_points(robot)
+    if not len(frames) or not masses.sum() > 0.0:
+        return None
+    made = mechanism(robot)
+    pitch = made.joints_of(PITCH)
+    at_rest = made.places[made.joint_place[pitch]]
+    rest = robot.forward(np.zeros(robot.n))
+    joints = np.array([int(np.argmin(np.abs(rest.positions[:, 0] - x))) for x in at_rest])
+    body_rest = rest.positions[frames, 0] + rotate(rest.array[frames, 3:], centres)[:, 0]
+    anchor_rest = made.places[made.joint_place[snake.columns[0::2]]]
+    # an anchor's load acts on the link behind its joint
+    loaded = anchor_rest[None, :] > at_rest[:, None] + 1e-12 * made.length
+    weights = masses * GRAVITY
+    ahead = (body_rest[None, :] > at_rest[:, None]) * weights
+    gain = np.asarray(made.gain[pitch])
+    return _Levers(np.asarray(frames), centres, joints, ahead, loaded, pitch, gain, float(weights.sum()))
 
 
 def support_margin(anchors: Array, center: Array, standing: BoolArray) -> Array:
@@ -103,11 +131,12 @@ def _loads(feet: Array, center: Array, total: float, weight: Array, arms: Array)
 
 def _least(balance: Array, wanted: Array, weight: Array, arms: Array) -> Array:
     """Loads (R, k) with ``balance`` (R, 2, k) loads = ``wanted`` and the least |weight - arms loads|."""
-    some: Array = np.einsum("rki,ri->rk", np.linalg.pinv(balance), wanted)
     k = balance.shape[2]
     if k == 2:
-        return some
-    _, _, basis = np.linalg.svd(balance)
+        return np.asarray(np.einsum("rki,ri->rk", np.linalg.pinv(balance), wanted))
+    turn, sizes, basis = np.linalg.svd(balance)
+    shares = np.where(sizes > SINGULAR * sizes[:, :1], 1.0 / np.maximum(sizes, 1e-300), 0.0)  # as in a pseudoinverse
+    some = np.einsum("rik,ri->rk", basis[:, :2], np.einsum("rij,ri->rj", turn, wanted) * shares)
     free = np.swapaxes(basis[:, 2:], -1, -2)  # (R, k, k - 2): what changes neither sum nor moment
     left = weight - np.einsum("rjk,rk->rj", arms, some)
     mix = np.einsum("rki,ri->rk", np.linalg.pinv(arms @ free), left)

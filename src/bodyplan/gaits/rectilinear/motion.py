@@ -8,8 +8,9 @@ import numpy as np
 
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import Status
+from bodyplan.gaits.rectilinear.extremes import Extremes, extremes
 from bodyplan.gaits.rectilinear.holding import Holding, holding
-from bodyplan.gaits.rectilinear.moves import Moves, State, bends
+from bodyplan.gaits.rectilinear.moves import bends
 from bodyplan.gaits.rectilinear.sequence import Moment, Sequence
 from bodyplan.gaits.rectilinear.snake import InchingSnake
 from bodyplan.gaits.rectilinear.track import Track
@@ -52,7 +53,7 @@ def motion_of(gait: Rectilinear, snake: InchingSnake, track: Track, sequence: Se
     standing = _standing(sequence, moment)
     held = holding(snake, poses.array, track.along, track.world(anchors) @ track.along, standing)
     contacts, forces = carrying(snake, standing, held)
-    states = _everywhere(snake, sequence.moves)
+    most = extremes(sequence.moves, snake.links, PLACES)
     return Motion(
         robot=robot,
         ground=track.ground,
@@ -64,20 +65,14 @@ def motion_of(gait: Rectilinear, snake: InchingSnake, track: Track, sequence: Se
         qdd=qdd,
         residual=residual,
         status=status,
-        claims=tuple(_claims(snake, track, sequence, states, t)) if _moves(sequence) else (),
+        claims=tuple(_claims(snake, track, sequence, most, t)) if _moves(sequence) else (),
         contacts=contacts,
         forces=forces,
         torques=None if held is None else held.torques,
-        facts=_facts(gait, snake, sequence, states, held),
+        facts=_facts(gait, snake, sequence, most, held),
         stages=_stages(sequence),
         notes=tuple(_notes(gait, sequence, held, t)),
     )
-
-
-def _everywhere(snake: InchingSnake, moves: Moves) -> State:
-    """The snake at PLACES places along every move (M, PLACES, ...)."""
-    which = np.repeat(np.arange(len(moves))[:, None], PLACES, axis=1)
-    return moves.state(snake.links, which, np.broadcast_to(np.linspace(0.0, 1.0, PLACES), which.shape))
 
 
 def _moves(sequence: Sequence) -> bool:
@@ -113,31 +108,33 @@ def _stages(sequence: Sequence) -> tuple[tuple[str, float, float], ...]:
     )
 
 
-def _claims(snake: InchingSnake, track: Track, sequence: Sequence, states: State, t: Array) -> list[Claim]:
+def _claims(snake: InchingSnake, track: Track, sequence: Sequence, most: Extremes, t: Array) -> list[Claim]:
     moves = sequence.moves
-    every = sequence.length if sequence.advance is not None and sequence.repeats is None else None
+    length, steps = sequence.length, _stages(sequence)
+    every = length if sequence.advance is not None and sequence.repeats is None else None
+    moving, swinging = moves.moving, moves.swinging
+    over = most.height - np.maximum(moves.before[..., 1], moves.after[..., 1])
+    between = float(np.diff(t).max(initial=0.0)) ** 2 / 8.0
     again = 1 if sequence.repeats is None else sequence.repeats
     names = snake.frames[0::2]
     out = []
     for turn in range(again):
-        for m, (stage, start, end) in enumerate(_stages(sequence)):
-            begin, stop = start + turn * sequence.length, end + turn * sequence.length
+        for m, (stage, start, end) in enumerate(steps):
+            begin, stop = start + turn * length, end + turn * length
             if begin >= t[-1]:
                 continue
             window: dict[str, Any] = {"start": begin, "end": min(stop, float(t[-1])), "every": every, "stage": stage}
-            still = [name for name, moving in zip(names, moves.moving[m], strict=True) if not moving]
+            still = [names[i] for i in np.flatnonzero(~moving[m])]
             if still:
                 data = {"frames": still, **window, "tolerance": EXACT}
                 out.append(Claim("at_rest", f"standing anchors at rest: {stage}", data))
-            lifted = [i for i in np.flatnonzero(moves.moving[m]) if moves.lift[m, i] > 0.0]
-            if lifted and stop <= t[-1] + 1e-9:
-                at = states.anchors[m, ..., 1]
-                ends = np.maximum(moves.before[m, :, 1], moves.after[m, :, 1])
-                height = float(min((at[:, i] - ends[i]).max() for i in lifted))
+            lifted = np.flatnonzero(swinging[m])
+            if len(lifted) and stop <= t[-1] + 1e-9:
+                height = float(over[m, lifted].min())
                 if height > 0.0:
                     # the top of a course that bends by z'' lies at most z'' dt^2 / 8 above the samples around it
-                    bend = float(np.abs(np.diff(at[:, lifted], 2, axis=0)).max()) * ((PLACES - 1) / (end - start)) ** 2
-                    missed = max(BETWEEN * height, bend * float(np.diff(t).max()) ** 2 / 8.0)
+                    bend = float(most.bend[m, lifted].max()) * ((PLACES - 1) / (end - start)) ** 2
+                    missed = max(BETWEEN * height, bend * between)
                     data = {"frames": [names[i] for i in lifted], **window, "height": height,
                             "tolerance": min(missed, height)}  # fmt: skip
                     out.append(Claim("lifted", f"swinging anchors clear of the floor: {stage}", data))
@@ -152,14 +149,14 @@ def _claims(snake: InchingSnake, track: Track, sequence: Sequence, states: State
 
 
 def _facts(
-    gait: Rectilinear, snake: InchingSnake, sequence: Sequence, states: State, held: Holding | None
+    gait: Rectilinear, snake: InchingSnake, sequence: Sequence, most: Extremes, held: Holding | None
 ) -> dict[str, float]:
     """Numbers of the plan, SI."""
     moves = sequence.moves
     gone = float((moves.after[-1, :, 0] - moves.before[0, :, 0]).mean())
     cycles = 1 if sequence.advance is not None else int(sequence.cycle.max()) + 1
     low = np.minimum(moves.before[..., 1].min(axis=1), moves.after[..., 1].min(axis=1))
-    high = states.elbows(snake.links)[..., 1].max(axis=(1, 2)) - low
+    high = most.elbow - low
     out = {
         "advance": gone * (sequence.repeats or 1),
         "advance_per_cycle": gone / cycles,
@@ -168,7 +165,7 @@ def _facts(
         "anchors": float(snake.anchors),
         "peak_elbow_height": float(high.max()),
         "peak_body_height": float(high.max()) + snake.top + snake.rest,
-        "peak_joint_rate": _peak_rate(states, sequence),
+        "peak_joint_rate": float((most.rate / sequence.durations).max()),
         "lift": float(moves.lift.max(initial=0.0)),
     }
     if sequence.advance is not None:
@@ -181,10 +178,6 @@ def _facts(
         out["support_margin"] = float(held.margin.min())
         out["peak_holding_torque"] = float(np.abs(held.torques).max(initial=0.0))
     return out
-
-
-def _peak_rate(states: State, sequence: Sequence) -> float:
-    return float((np.abs(bends(states.first)) / sequence.durations[:, None, None]).max())
 
 
 def _table(snake: InchingSnake, sequence: Sequence) -> dict[str, float]:
