@@ -5,6 +5,8 @@ import pytest
 
 import bodyplan as bp
 from bodyplan.gaits.carry import pose, pose_of, reach, wheel_rates
+from bodyplan.gaits.carry.terrain import terrain
+from bodyplan.ground import Ground
 from bodyplan.spatial import compose, exp
 
 STEP = bp.Profile(floor=[(None, 0.0), (1.0, 0.06)])
@@ -107,3 +109,20 @@ def test_a_flat_profile_is_a_plane() -> None:
     level, plane = (pose(ROBOT, ground, (0.0, 0.0), 0.2, roll=0.1, heading=0.3)
                     for ground in (bp.Profile(floor=0.03), bp.Plane(0.03)))  # fmt: skip
     np.testing.assert_allclose(level.joints, plane.joints, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "ground",
+    [
+        bp.Plane(0.3, slope=(0.1, -0.2)),
+        STAIRS,
+        bp.Surface("sin(3*x)*cos(2*y) + abs(x)"),
+        bp.HeightMap(np.sin(np.arange(63.0)).reshape(7, 9), 0.2, origin=(-0.7, -0.6)),
+    ],
+    ids=lambda ground: ground.kind,
+)
+def test_heights_alone_are_those_of_the_jet(ground: Ground) -> None:
+    """Also beyond the edge of a map, where no user gets but kernels ask."""
+    land = terrain(ground)
+    x, y = np.random.default_rng(3).uniform(-1.0, 1.5, (2, 200))
+    np.testing.assert_allclose(land.field_height(x, y), land.field_jet(x, y)[0], rtol=1e-14, atol=1e-13)

@@ -41,6 +41,10 @@ class Field(Ground):
     def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Height, gradient and Hessian at x, y (n,) in the rectangle; height nan where it is undefined."""
 
+    def field_height(self, x: Array, y: Array) -> Array:
+        """The height (n,) alone, to rounding."""
+        return self.field_jet(x, y)[0]
+
     @abstractmethod
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         """Bounds of the height and its derivatives over boxes with corners (n, 2)."""

@@ -215,6 +215,9 @@ class HeightMap(Field):
     def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         return self._spline.jet(x - self._origin[0], y - self._origin[1])
 
+    def field_height(self, x: Array, y: Array) -> Array:
+        return self._spline.value(x - self._origin[0], y - self._origin[1])
+
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         return self._spline.bounds(low - self._origin, high - self._origin)
 

@@ -76,7 +76,7 @@ def _hull_low(wheels: Wheels, land: Terrain, body: Carriage) -> Array:
     for box in hull.boxes(wheels.robot):
         points = body.position[:, None] + np.einsum("tij,pj->tpi", body.turn.matrix, hull.lower_face(box))
         flat = points.reshape(-1, 3)
-        above = land.field_jet(flat[:, 0], flat[:, 1])[0] - flat[:, 2]
+        above = land.field_height(flat[:, 0], flat[:, 1]) - flat[:, 2]
         out = np.maximum(out, above.reshape(points.shape[:2]).max(axis=1))
     return out
 

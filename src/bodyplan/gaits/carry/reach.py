@@ -148,14 +148,14 @@ def _guess(land: Terrain, planes: Planes, direction: Array, radius: Array) -> tu
     the contact with the radius given. Nothing relies on it."""
     count = len(planes)
     with np.errstate(all="ignore"):
-        floor = land.field_jet(planes.centre[:, 0], planes.centre[:, 1])[0]
+        floor = land.field_height(planes.centre[:, 0], planes.centre[:, 1])
         # from where the axle would be in the ground, and about the radius higher
         plain = np.where(np.isfinite(floor), floor - planes.centre[:, 2] + radius, np.nan)
         rise = np.sum(direction * [0.0, 0.0, 1.0], axis=1)
         angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _ANGLES + 2)[1:-1]
         rim = np.sin(angles)[:, None, None] * planes.ahead - np.cos(angles)[:, None, None] * planes.up
         at = (planes.centre + plain[:, None] * direction + radius[:, None] * rim).reshape(-1, 3)
-        gap = (land.field_jet(at[:, 0], at[:, 1])[0] - at[:, 2]).reshape(_ANGLES, count) / rise
+        gap = (land.field_height(at[:, 0], at[:, 1]) - at[:, 2]).reshape(_ANGLES, count) / rise
         gap = np.where(np.isfinite(gap), gap, -np.inf)
         best = gap.argmax(axis=0)
         chi, h = angles[best], plain + gap[best, np.arange(count)]

@@ -118,7 +118,7 @@ def _clearance(wheels: Wheels, land: Terrain, body: Carriage, ok: BoolArray) -> 
             if len(some) and bound[some[0]] > least:
                 break
             at = (body.position[rows[some], None] + local @ np.swapaxes(turn[some], 1, 2)).reshape(-1, 3)
-            gap = at[:, 2] - land.field_jet(at[:, 0], at[:, 1])[0]
+            gap = at[:, 2] - land.field_height(at[:, 0], at[:, 1])
             least = float(np.fmin.reduce(gap, initial=least))
     return least if np.isfinite(least) else None
 

@@ -23,6 +23,9 @@ class Terrain(Protocol):
     def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Height (n,), gradient (n, 2) and Hessian (n, 2, 2)."""
 
+    def field_height(self, x: Array, y: Array) -> Array:
+        """The height (n,) alone."""
+
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         """Bounds over boxes with corners (n, 2)."""
 
@@ -53,7 +56,10 @@ class Slope:
     def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
         g = np.empty((len(x), 2))
         g[:] = self.slope
-        return self.level + self.slope[0] * x + self.slope[1] * y, g, np.zeros((len(x), 2, 2))
+        return self.field_height(x, y), g, np.zeros((len(x), 2, 2))
+
+    def field_height(self, x: Array, y: Array) -> Array:
+        return np.asarray(self.level + self.slope[0] * x + self.slope[1] * y)
 
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         ends = np.sort([low * self.slope, high * self.slope], axis=0).sum(axis=-1) + self.level
@@ -82,8 +88,11 @@ class Steps:
         return np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
 
     def field_jet(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        return self.field_height(x, y), np.zeros((len(x), 2)), np.zeros((len(x), 2, 2))
+
+    def field_height(self, x: Array, y: Array) -> Array:
         before, after = (self.zs[np.searchsorted(self.xs, x, side=side)] for side in ("left", "right"))
-        return np.maximum(before, after), np.zeros((len(x), 2)), np.zeros((len(x), 2, 2))
+        return np.maximum(before, after)
 
     def field_bounds(self, low: Array, high: Array) -> Bounds:
         first = np.searchsorted(self.xs, low[:, 0], side="left")
