@@ -29,17 +29,16 @@ def body_of(snake: InchingSnake, bends: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.concatenate([np.zeros((len(bends), 1, 2)), np.cumsum(steps, axis=1)], axis=1), angles
 
 
-def told(parts: Parts, lengths: np.ndarray, points: np.ndarray, angles: np.ndarray, tail: float) -> np.ndarray:
-    """(S,) what the kernel says of all links at once."""
+def told(
+    parts: Parts, lengths: np.ndarray, points: np.ndarray, angles: np.ndarray, tail: float, moved: Any = None
+) -> np.ndarray:
+    """(S,) what the kernel says of links ``moved`` (all where None) and what is near them."""
     apart, count = apart_of(parts, lengths), len(lengths)
     turns = np.concatenate([np.zeros((len(angles), 1)), angles, np.zeros((len(angles), 1))], axis=1)
     origins = np.concatenate([points[:, :1] - [tail, 0.0], points], axis=1)
-    turn, moved, work = (
-        np.stack([np.cos(turns), np.sin(turns)], axis=-1),
-        np.ones(count, dtype=bool),
-        np.empty((count, 9)),
-    )
-    return np.array([all_apart(apart, origins[s], turn[s], moved, work) for s in range(len(origins))])
+    turn = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    moved = np.ones(count, dtype=bool) if moved is None else moved
+    return np.array([all_apart(apart, origins[s], turn[s], moved) for s in range(len(origins))])
 
 
 def folds(rng: np.random.Generator, count: int, links: int) -> np.ndarray:
@@ -64,6 +63,22 @@ def test_links_told_apart_have_no_parts_that_overlap(name: str) -> None:
     assert into[apart].max(initial=-1.0) <= 0.0
     assert apart[into <= -0.5 * parts.need.max()].mean() > 0.5, "most that are clear by far are told so"
     assert 100 < apart.sum() < len(apart)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_some_links_and_the_others_are_all_of_them(name: str) -> None:
+    """Two links are looked at with either of them: what some links say and what the rest says is what all say."""
+    snake = InchingSnake.of(ROBOTS[name](), 5, None)
+    parts, rng = snake.parts, np.random.default_rng(len(name) + 1)
+    assert parts is not None
+    lengths = np.concatenate([[snake.tail], snake.links, [snake.head]])
+    points, angles = body_of(snake, folds(rng, 2000, len(snake.links)))
+    every = told(parts, lengths, points, angles, snake.tail)
+    for _ in range(5):
+        some = rng.uniform(size=len(lengths)) < 0.3
+        mine, others = (told(parts, lengths, points, angles, snake.tail, moved) for moved in (some, ~some))
+        np.testing.assert_array_equal(mine & others, every)
+    assert told(parts, lengths, points, angles, snake.tail, np.zeros(len(lengths), dtype=bool)).all()
 
 
 def test_parts_beside_their_links_and_beyond_their_ends() -> None:

@@ -15,7 +15,7 @@ from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear import course
 from bodyplan.gaits.rectilinear import walker as module
 from bodyplan.gaits.rectilinear.demands import phases
-from bodyplan.gaits.rectilinear.landings import CLOSE, Landings, moves_of
+from bodyplan.gaits.rectilinear.landings import CLOSE, Landings
 from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.offers import places, reach
 from bodyplan.gaits.rectilinear.search import NARROW, WIDE, Breadth, Way, search
@@ -172,6 +172,27 @@ def test_what_is_offered_is_what_brute_force_finds() -> None:
     assert some - plain > 30, "swings over edges are among them"
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_what_stands_is_looked_at_once_and_nothing_is_missed(seed: int) -> None:
+    """Moves of any anchors, most of which run into something: whether the first thing is looked for, where what does
+    not move has been tried at the first place, or everything at all places."""
+    walker, _, stance = walker_of(seed)
+    rng, count = np.random.default_rng(seed), walker.snake.anchors
+    stances = np.array([stance() for _ in range(60)])
+    moving = rng.uniform(size=(60, count)) < 0.4
+    after = stances.copy()
+    after[..., 0] += moving * rng.uniform(-0.1, 0.1, moving.shape)
+    after[..., 1] = walker.stand(after[..., 0])[..., 1] + moving * rng.choice([0.0, 0.0, -1e-3], moving.shape)
+    lift = moving * rng.choice([0.0, 0.03, 0.06], moving.shape)
+    early = np.where(rng.uniform(size=moving.shape) < 0.6, 1.0, rng.uniform(0.3, 1.0, moving.shape))
+    rows = np.concatenate([after, lift[..., None], early[..., None]], axis=-1)
+    for size in (25, 121):
+        tau = module._halved(size).tau
+        told = walker.tried(Moves(stances, after, lift, early, ("",) * 60), tau)
+        np.testing.assert_array_equal(walker.sound(stances, rows, size), np.array(told) == Status.OK)
+    assert 3 < sum(status == Status.OK for status in told) < 57
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_all_searches_know_the_same_of_a_stance(seed: int) -> None:
     """Whatever else was asked before, in batches or one by one, and by whom; and each is found once."""
@@ -196,7 +217,7 @@ def test_all_searches_know_the_same_of_a_stance(seed: int) -> None:
         together.try_all(moves[::2])
         together.try_all(moves)
         for before, landing in moves:
-            assert landing.sound == bool(walker.sound(moves_of([before], [landing.row]), CLOSE)[0])
+            assert landing.sound == bool(walker.sound(before[None], landing.row[None], CLOSE)[0])
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3, 5])
@@ -218,8 +239,9 @@ def test_a_search_finds_the_same_after_others(seed: int) -> None:
 
 def way_to(share: float, status: Status, far: float) -> Way:
     """One move that goes so far."""
-    before, after = row_of(np.zeros((3, 2))), row_of(np.full((3, 2), [share * far, 0.0]))
-    return Way([moves_of([before], [after], ["tail moves"])], np.zeros(1, dtype=np.int64), status, "")
+    before, none = np.zeros((1, 3, 2)), np.zeros((1, 3))
+    move = Moves(before, before + np.array([share * far, 0.0]), none, none + 1.0, ("tail moves",))
+    return Way([move], np.zeros(1, dtype=np.int64), status, "")
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -52,10 +52,10 @@ def apart_of(parts: Parts, lengths: Array) -> Apart:
 
 
 @inlined
-def all_apart(apart: Apart, origins: Array, turn: Array, moved: BoolArray, work: Array) -> bool:
+def all_apart(apart: Apart, origins: Array, turn: Array, moved: BoolArray) -> bool:
     """True where no two parts of a body can be too near: links from ``origins`` (2 N, 2) m in directions ``turn``
-    (2 N, 2). Only links ``moved`` (2 N,) are looked at, and what is near them. ``work`` (2 N, 9) is room."""
-    span, keep, fold, count = apart.span, apart.keep, apart.fold, len(origins)
+    (2 N, 2). Only links ``moved`` (2 N,) are looked at, and what is near them."""
+    keep, fold, count = apart.keep, apart.fold, len(origins)
     for k in range(count - 1):
         if (moved[k] or moved[k + 1]) and fold[k] > 0.0:
             # a point r from the joint is r sin(angle) from a link that turns back, and r or more from one that does not
@@ -64,50 +64,40 @@ def all_apart(apart: Apart, origins: Array, turn: Array, moved: BoolArray, work:
                     return False
             elif fold[k] >= 1.0:
                 return False
-    if _in_line(apart, origins, turn):
-        return True
-    for k in range(count):
-        x, z, cosine, sine = origins[k, 0], origins[k, 1], turn[k, 0], turn[k, 1]
-        work[k, 0], work[k, 1] = x + span[k, 0] * cosine, z + span[k, 0] * sine
-        work[k, 2], work[k, 3] = x + span[k, 1] * cosine, z + span[k, 1] * sine
-        work[k, 4], work[k, 5] = min(work[k, 0], work[k, 2]), max(work[k, 0], work[k, 2])
-        work[k, 6], work[k, 7] = min(work[k, 1], work[k, 3]), max(work[k, 1], work[k, 3])
-    work[count - 1, 8] = work[count - 1, 4]
-    for k in range(count - 2, -1, -1):
-        work[k, 8] = min(work[k, 4], work[k + 1, 8])  # what is ahead begins there
-    for k in range(count - 2):
-        for j in range(k + 2, count):
-            if work[j, 8] - work[k, 5] >= apart.most:
-                break
-            need = keep[k, j]
-            if need <= 0.0 or not (moved[k] or moved[j]):
-                continue
-            if work[j, 4] - work[k, 5] >= need or work[k, 4] - work[j, 5] >= need:
-                continue
-            if work[j, 6] - work[k, 7] >= need or work[k, 6] - work[j, 7] >= need:
-                continue
-            if not (_beside(work, turn, k, j, need) or _beside(work, turn, j, k, need)):
-                return False
+    ahead, begin = np.inf, np.inf  # where the links behind the next one begin, and the next one
+    for k in range(count - 1, -1, -1):
+        low, high = _reach(apart, origins, turn, k, 0)
+        if ahead - high < apart.most:
+            for j in range(k + 2, count):
+                need = keep[k, j]
+                if need <= 0.0 or not (moved[k] or moved[j]):
+                    continue
+                left, right = _reach(apart, origins, turn, j, 0)
+                if left - high >= need or low - right >= need:
+                    continue
+                bottom, top = _reach(apart, origins, turn, k, 1)
+                under, over = _reach(apart, origins, turn, j, 1)
+                if under - top >= need or bottom - over >= need:
+                    continue
+                if not (_beside(apart, origins, turn, k, j, need) or _beside(apart, origins, turn, j, k, need)):
+                    return False
+        ahead, begin = min(ahead, begin), low
     return True
 
 
 @lean
-def _in_line(apart: Apart, origins: Array, turn: Array) -> bool:
-    """Whether all links that do not meet come one after the other along the way, far enough from each other."""
-    ahead, second = np.inf, np.inf
-    for k in range(len(origins) - 1, -1, -1):
-        x, one, other = origins[k, 0], apart.span[k, 0] * turn[k, 0], apart.span[k, 1] * turn[k, 0]
-        # ``ahead`` of this link and the next one all others begin
-        if ahead - (x + max(one, other)) < apart.most:
-            return False
-        ahead, second = min(ahead, second), x + min(one, other)
-    return True
+def _reach(apart: Apart, origins: Array, turn: Array, k: int, c: int) -> tuple[float, float]:
+    """m from where to where the parts of link ``k`` reach, along (``c`` = 0) or up (1)."""
+    at, first, last = origins[k, c], apart.span[k, 0] * turn[k, c], apart.span[k, 1] * turn[k, c]
+    return at + min(first, last), at + max(first, last)
 
 
 @lean
-def _beside(work: Array, turn: Array, k: int, j: int, need: float) -> bool:
+def _beside(apart: Apart, origins: Array, turn: Array, k: int, j: int, need: float) -> bool:
     """Whether all of link ``j`` lies on one side of the line through link ``k``, ``need`` m from it or farther."""
-    x, z, cosine, sine = work[k, 0], work[k, 1], turn[k, 0], turn[k, 1]
-    first = cosine * (work[j, 1] - z) - sine * (work[j, 0] - x)
-    last = cosine * (work[j, 3] - z) - sine * (work[j, 2] - x)
+    cosine, sine = turn[k, 0], turn[k, 1]
+    x, z = origins[k, 0] + apart.span[k, 0] * cosine, origins[k, 1] + apart.span[k, 0] * sine
+    at, up = origins[j, 0] - x, origins[j, 1] - z
+    first = cosine * (up + apart.span[j, 0] * turn[j, 1]) - sine * (at + apart.span[j, 0] * turn[j, 0])
+    last = cosine * (up + apart.span[j, 1] * turn[j, 1]) - sine * (at + apart.span[j, 1] * turn[j, 0])
     return bool(min(first, last) >= need or max(first, last) <= -need)

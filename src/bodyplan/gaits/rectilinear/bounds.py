@@ -11,7 +11,7 @@ from bodyplan.arrays import Array, BoolArray, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.apart import Apart, all_apart
 from bodyplan.gaits.rectilinear.legs import elbow, leg_angles
-from bodyplan.gaits.rectilinear.moves import chord_of, swing_of
+from bodyplan.gaits.rectilinear.moves import chord_of, swing_one
 from bodyplan.gaits.rectilinear.parts import overlap
 from bodyplan.gaits.rectilinear.swing import Even, even_at
 from bodyplan.kernels import inlined, lean
@@ -56,9 +56,9 @@ class Bounds(NamedTuple):
 class Pose(NamedTuple):
     """Room for one pose: ``start``, ``offset`` and ``anchors`` (N, 2) m, ``origins`` (2 N, 2) m of all links with the
     tail link and the head link, cosine and sine ``turn`` (2 N, 2) of their angles, ``angles`` (2 N,) rad, ``short`` and
-    ``square`` (N - 1,) m^2 of the legs, and room (2 N, 9) for :func:`all_apart` and (P, 9) for :func:`overlap`. What
-    moves with no anchor that moves is laid and tried once for a move: ``fresh`` (2,) says that it is not there yet, nor
-    the parts on it, ``moved`` (2 N,) which links were laid last."""
+    ``square`` (N - 1,) m^2 of the legs, and room (P, 9) for :func:`overlap`. What moves with no anchor that moves is
+    laid and tried once for a move: ``fresh`` (2,) says that it is not there yet, nor the parts on it, ``moved`` (2 N,)
+    which links were laid last."""
 
     start: Array
     offset: Array
@@ -68,7 +68,6 @@ class Pose(NamedTuple):
     angles: Array
     short: Array
     square: Array
-    spans: Array
     work: Array
     fresh: BoolArray
     moved: BoolArray
@@ -89,7 +88,6 @@ def room_for(bounds: Bounds) -> Pose:
         np.zeros(2 * count),
         np.zeros(count - 1),
         np.zeros(count - 1),
-        np.zeros((2 * count, 9)),
         np.zeros((len(bounds.link), 9)),
         np.ones(2, dtype=np.bool_),
         np.ones(2 * count, dtype=np.bool_),
@@ -103,15 +101,16 @@ def lay(
 ) -> None:  # fmt: skip
     """The snake at ``tau`` of move ``m``, where swings have ``even`` in common; NaN where a leg does not reach.
     ``only``: an anchor that has moved since the last pose, whether it does in this move or not (-1: none)."""
-    links, count = bounds.links, before.shape[1]
-    swing_of(before, after, lift, early, m, tau, even, pose.start, pose.offset)
+    links, count, fresh = bounds.links, before.shape[1], pose.fresh[0]
     anchors, origins, turn, moved = pose.anchors, pose.origins, pose.turn, pose.moved
     for k in range(2 * count):
-        moved[k] = pose.fresh[0]
+        moved[k] = fresh
     for i in range(count):
-        anchors[i, 0] = pose.start[i, 0] + pose.offset[i, 0]
-        anchors[i, 1] = pose.start[i, 1] + pose.offset[i, 1]
         moves = before[m, i, 0] != after[m, i, 0] or before[m, i, 1] != after[m, i, 1] or lift[m, i] != 0.0
+        if moves or i == only or fresh:
+            swing_one(before, after, lift, early, m, i, tau, even, pose.start, pose.offset)
+            anchors[i, 0] = pose.start[i, 0] + pose.offset[i, 0]
+            anchors[i, 1] = pose.start[i, 1] + pose.offset[i, 1]
         if moves or i == only:
             for k in range(max(2 * i - 1, 0), min(2 * i + 3, 2 * count)):
                 moved[k] = True
@@ -177,7 +176,7 @@ def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: 
     if len(bounds.link) and known:
         # of those that are clear of each other it does not matter by how much where only that is asked
         least = -bounds.most if enough == np.inf else 0.0
-        if least == 0.0 and all_apart(bounds.apart, origins, pose.turn, pose.moved, pose.spans):
+        if least == 0.0 and all_apart(bounds.apart, origins, pose.turn, pose.moved):
             own = other = least
         else:
             if pose.fresh[1]:

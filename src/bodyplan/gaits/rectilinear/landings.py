@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bodyplan.arrays import Array, IntArray
-from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.offers import Offers
-from bodyplan.gaits.rectilinear.walker import Walker
+from bodyplan.gaits.rectilinear.walker import AT_ONCE, Walker
 
 #: places along a move at which it is tried with the whole body
 CLOSE = 121
@@ -57,33 +56,25 @@ class Landings:
             far = far_of(rows).tolist()
             for b, (key, count) in enumerate(zip(new, told.tolist(), strict=True)):
                 some = [Landing(rows[b, k], far[b][k]) for k in range(count)]
-                self.known[key] = Ahead(group, offers, b, some, count == rows.shape[1])
+                self.known[key] = Ahead(group, offers, b, some, count == AT_ONCE)
         return [self.known[key] for key in keys]
 
     def landing(self, ahead: Ahead, k: int) -> Landing | None:
         """The one of number ``k``, None behind the last; all before it have been asked for."""
         if k == len(ahead.told) and ahead.more:
-            row = self.walker.nearer(ahead.offers, ahead.number, ahead.group)
-            if row is None:
-                ahead.more = False
-            else:
-                ahead.told.append(Landing(row, float(far_of(row))))
+            rows = self.walker.nearer(ahead.offers, ahead.number, ahead.group)
+            ahead.told += [Landing(row, far) for row, far in zip(rows, far_of(rows).tolist(), strict=True)]
+            ahead.more = len(rows) == AT_ONCE
         return ahead.told[k] if k < len(ahead.told) else None
 
     def try_all(self, moves: Sequence[tuple[Array, Landing]]) -> None:
         """Find out which of the landings, each with the stance (N, 4) before it, are sound."""
         new = [(before, landing) for before, landing in moves if landing.sound is None]
         if new:
-            found = self.walker.sound(moves_of([before for before, _ in new], [a.row for _, a in new]), CLOSE)
+            stances, rows = np.array([before for before, _ in new]), np.array([landing.row for _, landing in new])
+            found = self.walker.sound(stances, rows, CLOSE)
             for (_, landing), sound in zip(new, found.tolist(), strict=True):
                 landing.sound = sound
-
-
-def moves_of(before: Sequence[Array], after: Sequence[Array], names: Sequence[str] | None = None) -> Moves:
-    """Moves from stances to others, rows (N, 4) as in :class:`Landing`."""
-    rows = np.array(after)
-    some = ("",) * len(after) if names is None else tuple(names)
-    return Moves(np.array(before)[..., :2], rows[..., :2], rows[..., 2], rows[..., 3], some)
 
 
 def far_of(rows: Array) -> Array:

@@ -73,14 +73,23 @@ def swing_of(
     """Anchors of move ``m`` at ``tau``: ``start`` (N, 2) m, where they are at the nearer end of the move, and their
     ``offset`` (N, 2) m from there; ``even`` as :func:`even_at` has it there."""
     for i in range(before.shape[1]):
-        dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]
-        start[i, 0] = before[m, i, 0] if tau < 0.5 else after[m, i, 0]
-        start[i, 1] = before[m, i, 1] if tau < 0.5 else after[m, i, 1]
-        offset[i, 0] = offset[i, 1] = 0.0
-        if dx != 0.0 or dz != 0.0 or lift[m, i] != 0.0:
-            risen_x, risen_z, left_x, left_z = swung(tau, even, dx, dz, lift[m, i], early[m, i])
-            offset[i, 0] = risen_x if tau < 0.5 else left_x
-            offset[i, 1] = risen_z if tau < 0.5 else left_z
+        swing_one(before, after, lift, early, m, i, tau, even, start, offset)
+
+
+@inlined
+def swing_one(
+    before: Array, after: Array, lift: Array, early: Array, m: int, i: int, tau: float, even: Even, start: Array,
+    offset: Array,
+) -> None:  # fmt: skip
+    """:func:`swing_of` for anchor ``i``."""
+    dx, dz = after[m, i, 0] - before[m, i, 0], after[m, i, 1] - before[m, i, 1]
+    start[i, 0] = before[m, i, 0] if tau < 0.5 else after[m, i, 0]
+    start[i, 1] = before[m, i, 1] if tau < 0.5 else after[m, i, 1]
+    offset[i, 0] = offset[i, 1] = 0.0
+    if dx != 0.0 or dz != 0.0 or lift[m, i] != 0.0:
+        risen_x, risen_z, left_x, left_z = swung(tau, even, dx, dz, lift[m, i], early[m, i])
+        offset[i, 0] = risen_x if tau < 0.5 else left_x
+        offset[i, 1] = risen_z if tau < 0.5 else left_z
 
 
 @lean

@@ -265,9 +265,11 @@ def farthest(
 def nearer(
     bounds: Bounds, steps: Steps, keeps: Keeps, ranges: Ranges, choice: Choice, met: float, group: IntArray,
     offers: Offers, b: int, out: Array,
-) -> bool:  # fmt: skip
-    """Offer stance ``b`` what lies next behind, into ``out`` (N, 4); False where nothing does."""
+) -> int:  # fmt: skip
+    """Offer stance ``b`` what lies behind, one after the other, into ``out`` (A, N, 4); how many there are of it."""
     trial = trial_of(bounds, offers.here[b], choice.places)
-    some = _nearer(bounds, steps, keeps, ranges, choice, met, offers, trial, group, b)
-    _tell(offers, group, b, out)
-    return some
+    told = 0
+    while told < len(out) and _nearer(bounds, steps, keeps, ranges, choice, met, offers, trial, group, b):
+        _tell(offers, group, b, out[told])
+        told += 1
+    return told

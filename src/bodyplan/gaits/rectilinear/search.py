@@ -18,7 +18,7 @@ import numpy as np
 from bodyplan.arrays import Array, IntArray
 from bodyplan.errors import Status
 from bodyplan.gaits.rectilinear.demands import move_names, phases
-from bodyplan.gaits.rectilinear.landings import Ahead, Landing, Landings, far_of, moves_of
+from bodyplan.gaits.rectilinear.landings import Ahead, Landing, Landings, far_of
 from bodyplan.gaits.rectilinear.moves import Moves
 from bodyplan.gaits.rectilinear.walker import Walker, Why
 
@@ -209,8 +209,9 @@ def _way(line: list[_State], names: list[str], status: Status, reason: str, trie
     return Way([_move(a, b, names[a.phase]) for a, b in moves], cycles, status, reason, tried)
 
 
-def _move(before: _State, after: _State, name: str = "") -> Moves:
-    return moves_of([before.at], [after.at], [name])
+def _move(before: _State, after: _State, name: str) -> Moves:
+    places, rest = after.at[None, :, :2], after.at[None, :, 2:]
+    return Moves(before.at[None, :, :2], places, rest[..., 0], rest[..., 1], (name,))
 
 
 def _line(state: _State) -> list[_State]:
@@ -228,11 +229,11 @@ def _mended(walker: Walker, state: _State) -> list[_State]:
     moving = [k for k, s in enumerate(line) if s.landing is not None]
     if not moving:
         return line
-    before, after = [line[k - 1].at for k in moving], [line[k].at for k in moving]
-    sound = walker.sound(moves_of(before, after), FINAL, True)
+    before, after = np.array([line[k - 1].at for k in moving]), np.array([line[k].at for k in moving])
+    sound = walker.sound(before, after, FINAL, True)
     for k in (k for k, good in zip(moving, sound, strict=True) if not good):
-        higher = [line[k].at * [1.0, 1.0, share, 1.0] for share in HIGHER]
-        good = np.flatnonzero(walker.sound(moves_of([line[k - 1].at] * len(higher), higher), FINAL, True))
+        higher = np.array([line[k].at * [1.0, 1.0, share, 1.0] for share in HIGHER])
+        good = np.flatnonzero(walker.sound(np.array([line[k - 1].at] * len(higher)), higher, FINAL, True))
         if not len(good):
             return line[:k]
         line[k] = replace(line[k], at=higher[good[0]])

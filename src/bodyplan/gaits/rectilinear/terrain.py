@@ -86,6 +86,16 @@ def up_to(xs: Array, x: float) -> int:
 
 
 @lean
+def onward(xs: Array, x: float, at: int) -> int:
+    """:func:`left_of`, looked for from ``at`` on."""
+    while at > 0 and xs[at - 1] >= x:
+        at -= 1
+    while at < len(xs) and xs[at] < x:
+        at += 1
+    return at
+
+
+@lean
 def highest(xs: Array, zs: Array, low: float, high: float) -> float:
     """Highest level of a floor from ``low`` to ``high`` m, both ends included."""
     first, last = left_of(xs, low), up_to(xs, high)
@@ -179,24 +189,35 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
     if last == 2 * count:
         right = max(right, origins[last - 1, 0] + keeps.head)
     reach, above = keeps.body + max(keeps.margin, keeps.low), keeps.top + keeps.margin
-    ground = highest(floor_x, floor_z, left - reach, right + reach)
-    roof = highest(steps.roof_x, steps.roof_z, left - above, right + above)
-    edge = left_of(floor_x, left - reach)
-    edges = edge < len(floor_x) and floor_x[edge] <= right + reach
+    at, end = left_of(floor_x, left - reach), up_to(floor_x, right + reach)
+    ground = floor_z[at]
+    for k in range(at + 1, end + 1):
+        ground = max(ground, floor_z[k])
     floor = ceiling = False
     # where no step is near the floor is level under all of the body
-    clear = not edges and low - ground >= max(keeps.rest, keeps.body) - slack
+    clear = at == end and low - ground >= max(keeps.rest, keeps.body) - slack
     if not clear:
+        stands, near = keeps.rest - slack, max(keeps.rest - slack, 0.0)
         for i in range(count):
             if not floor and (only < 0 or i == only):
                 x, z = pose.anchors[i, 0], pose.anchors[i, 1]
-                floor = nearer(floor_x, floor_z, x, z, x, z, keeps.rest - slack)
+                at = onward(floor_x, x - near, at)
+                if at == len(floor_x) or floor_x[at] > x + near:
+                    floor = z - floor_z[at] < stands
+                else:
+                    floor = nearer(floor_x, floor_z, x, z, x, z, stands)
+    roof_x, roof_z, under = steps.roof_x, steps.roof_z, left_of(steps.roof_x, left - above)
+    roof = roof_z[under]
+    for k in range(under + 1, up_to(roof_x, right + above) + 1):
+        roof = max(roof, roof_z[k])
     for k in range(first, last):
+        if not pose.moved[k]:
+            continue
         x0, z0 = origins[k, 0], origins[k, 1]
         x1, z1 = (origins[k + 1, 0], origins[k + 1, 1]) if k < 2 * count - 1 else (x0 + keeps.head, z0)
         low, high = min(x0, x1), max(x0, x1)
         if not (clear or floor) and min(z0, z1) - ground < reach:
-            at = left_of(floor_x, low - reach)
+            at = onward(floor_x, low - reach, at)
             if at == len(floor_x) or floor_x[at] > high + reach:  # level all along
                 floor = min(z0, z1) - floor_z[at] < keeps.body - slack
             else:
@@ -205,11 +226,11 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
                 floor = floor or _at_corner(floor_x, floor_z, x0, z0, x1, z1, keeps.body + more, none)
         # links keep from the ceiling what the joints must: those are where it is nearest
         if not ceiling and max(z0, z1) + roof > -above:
-            at = left_of(steps.roof_x, low - above)
-            if at == len(steps.roof_x) or steps.roof_x[at] > high + above:
-                ceiling = -max(z0, z1) - steps.roof_z[at] < above - none
+            under = onward(roof_x, low - above, under)
+            if under == len(roof_x) or roof_x[under] > high + above:
+                ceiling = -max(z0, z1) - roof_z[under] < above - none
             else:
-                ceiling = nearer(steps.roof_x, steps.roof_z, x0, -z0, x1, -z1, above - none)
+                ceiling = nearer(roof_x, roof_z, x0, -z0, x1, -z1, above - none)
     return floor, ceiling
 
 
@@ -295,40 +316,25 @@ def try_move(
 
 @njit(cache=True)
 def try_moves(
-    bounds: Bounds,
-    steps: Steps,
-    keeps: Keeps,
-    before: Array,
-    after: Array,
-    lift: Array,
-    early: Array,
-    swinging: BoolArray,
-    places: Places,
-    only: int,
-    met: float,
-    every: bool,
-    out: BoolArray,
-) -> None:
-    """:func:`try_move` for every move, into ``out`` (M, 9)."""
-    pose, found = room_for(bounds), np.empty(len(DEMANDS))
-    for m in range(len(before)):
+    bounds: Bounds, steps: Steps, keeps: Keeps, stances: Array, rows: Array, places: Places, only: int, met: float,
+    every: bool, out: BoolArray,
+) -> None:  # fmt: skip
+    """:func:`try_move` for every move, into ``out`` (M, 9): from ``stances`` (M, N, 2 or more) to ``rows`` (M, N, 4)
+    with places, lift and how early anchors rise."""
+    count = rows.shape[1]
+    pose, found, swinging = room_for(bounds), np.empty(len(DEMANDS)), np.empty(count, dtype=np.bool_)
+    before, after = np.empty((1, count, 2)), np.empty((1, count, 2))
+    lift, early = np.empty((1, count)), np.empty((1, count))
+    for m in range(len(rows)):
         pose.fresh[:] = True
+        for i in range(count):
+            moves = False
+            for c in range(2):
+                before[0, i, c], after[0, i, c] = stances[m, i, c], rows[m, i, c]
+                moves = moves or before[0, i, c] != after[0, i, c]
+            lift[0, i], early[0, i] = rows[m, i, 2], rows[m, i, 3]
+            swinging[i] = moves and lift[0, i] > 0.0
         try_move(
-            bounds,
-            steps,
-            keeps,
-            before,
-            after,
-            lift,
-            early,
-            swinging[m],
-            m,
-            places,
-            len(places.order),
-            only,
-            met,
-            every,
-            pose,
-            found,
-            out[m],
-        )
+            bounds, steps, keeps, before, after, lift, early, swinging, 0, places, len(places.order), only, met, every,
+            pose, found, out[m],
+        )  # fmt: skip

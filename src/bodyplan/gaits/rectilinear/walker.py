@@ -23,7 +23,7 @@ from bodyplan.gaits.rectilinear.track import Track
 SPOTS, CLOSER, ROUNDS = 20, 4, 2
 #: where among the spots that go those lie that are offered beside the farthest
 SHARES = (0.8, 0.55, 0.3, 0.0)
-#: how many landings of a stance are found at once: most of them are asked for
+#: how many landings of a stance are found at once: a call takes longer than some of them that nobody asks for
 AT_ONCE = 3
 #: places along a move at which it is tried
 PLACES = 25
@@ -92,27 +92,26 @@ class Walker:
     def tried(self, moves: Moves, tau: Array, only: int | None = None) -> list[Status]:
         """The first demand, floor or ceiling that each move runs into at ``tau`` (p,), or ok. ``only``: the one
         anchor that moves in all of them; what does not move with it has been tried before."""
-        found = self._into(moves, _places(tau), only, True)
+        found, who = np.empty((len(moves), len(TRIED)), dtype=bool), -1 if only is None else int(only)
+        rows = np.concatenate([moves.after, moves.lift[..., None], moves.early[..., None]], axis=-1)
+        try_moves(
+            self.demands.bounds, self.track.steps, self.keeps, np.ascontiguousarray(moves.before), rows, _places(tau),
+            who, MET, True, found,
+        )  # fmt: skip
         told = np.arange(len(TRIED))
         if np.isfinite(self.demands.ceiling):  # a ceiling of its own is told in its place among the demands
             found[:, TRIED.index(Status.ABOVE_CEILING)] |= found[:, told[-1]]
         return [next((TRIED[k] for k in np.flatnonzero(row)), Status.OK) for row in found]
 
-    def sound(self, moves: Moves, places: int, between: bool = False) -> BoolArray:
-        """(M,) True for the moves that run into nothing at so many ``places``, with the whole body; ``between``: where
-        most of them lie between those at which the moves have been tried."""
-        return np.asarray(~self._into(moves, _halved(places), None, False, between).any(axis=1))
-
-    def _into(self, moves: Moves, places: Places, only: int | None, every: bool, between: bool = False) -> BoolArray:
-        """(M, 9): what each move runs into, all of it with ``every``, else the first thing that is found."""
-        keeps = self.least if between else self.keeps
-        out = np.empty((len(moves), len(TRIED)), dtype=bool)
-        who = -1 if only is None else int(only)
+    def sound(self, stances: Array, rows: Array, places: int, between: bool = False) -> BoolArray:
+        """(M,) True for the moves that run into nothing at so many ``places``, with the whole body: from ``stances``
+        (M, N, 2 or more) to ``rows`` (M, N, 4), s and height m, lift m and how early anchors rise. ``between``: where
+        most of the places lie between those at which the moves have been tried."""
+        out, keeps = np.empty((len(rows), len(TRIED)), dtype=bool), self.least if between else self.keeps
         try_moves(
-            self.demands.bounds, self.track.steps, keeps, *moves.tables, moves.swinging, places, who, MET, every,
-            out,
+            self.demands.bounds, self.track.steps, keeps, stances, rows, _halved(places), -1, MET, False, out
         )  # fmt: skip
-        return out
+        return np.asarray(~out.any(axis=1))
 
     def shaped(self, here: Array, i: int, spot: Array) -> tuple[Spot, Status]:
         """The swing of anchor ``i`` of ``here`` (N, 2) to ``spot`` (2,) in the first shape that goes; with the first
@@ -166,10 +165,10 @@ class Walker:
         farthest(*self._known, _choice(), MET, group, offers, rows, told)
         return offers, rows, told
 
-    def nearer(self, offers: Offers, number: int, group: IntArray) -> Array | None:
-        """Offer stance ``number`` what lies next behind (N, 4); None where nothing does."""
-        row = np.empty((offers.here.shape[1], 4))
-        return row if nearer(*self._known, _choice(), MET, group, offers, number, row) else None
+    def nearer(self, offers: Offers, number: int, group: IntArray) -> Array:
+        """Offer stance ``number`` what lies next behind: the moves (A, N, 4), fewer than AT_ONCE where they end."""
+        rows = np.empty((AT_ONCE, offers.here.shape[1], 4))
+        return rows[: nearer(*self._known, _choice(), MET, group, offers, number, rows)]
 
     @cached_property
     def _known(self) -> tuple[Bounds, Steps, Keeps, Ranges]:
