@@ -249,21 +249,22 @@ def test_the_first_brisk_way_is_taken_or_else_the_farthest_that_is_not_slow(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ways of searches by chance. Those of narrow ones that are slow count for nothing: they may be steps on the spot
-    before what cannot be passed."""
+    before what cannot be passed. Crouching is tried where it makes a difference."""
     rng = np.random.default_rng(seed)
     walker = replace(walker_of(seed)[0], crouch=None)
-    roof = bool(np.isfinite(walker.track.steps.roof_z).any())
+    crouches = bool(np.isfinite(walker.track.steps.roof_z).any()) and seed % 4 == 1
     wanted, pace, made = 10, 0.1, []
 
     def by_chance(landings: Landings, start: Any, *args: Any, partly: bool) -> Way:
         breadth = args[-1]
         assert partly == (breadth is WIDE)
+        landings.walker.noted[0] |= crouches
         status = Status.OK if rng.uniform() < 0.6 else Status.BELOW_FLOOR
         share = float(rng.uniform(0.2, 0.7 if seed % 2 else course.BRISK))
         way = way_to(share, status, wanted * pace)
         if status != Status.OK and not partly:
             way = Way([], np.zeros(0, dtype=np.int64), status, "")
-        made.append((landings.walker.crouch is not None, breadth, share, way))
+        made.append((landings.walker.crouch is not None and not landings.walker.upright, breadth, share, way))
         return way
 
     monkeypatch.setattr(course, "search", by_chance)
@@ -272,8 +273,8 @@ def test_the_first_brisk_way_is_taken_or_else_the_farthest_that_is_not_slow(
     if brisk:
         assert brisk == [len(made) - 1] and way is made[-1][3]
         return
-    order = [(crouching, some) for crouching in ((False, True) if roof else (False,)) for some in NARROW]
-    order += [(crouching, WIDE) for crouching in ((False, True) if roof else (False,))]
+    order = [(crouching, some) for crouching in ((False, True) if crouches else (False,)) for some in NARROW]
+    order += [(crouching, WIDE) for crouching in ((False, True) if crouches else (False,))]
     assert [(crouching, breadth) for crouching, breadth, _, _ in made] == order
     ways = [
         (way.status == Status.OK, share, way)
@@ -281,3 +282,38 @@ def test_the_first_brisk_way_is_taken_or_else_the_farthest_that_is_not_slow(
         if breadth is WIDE or (way.status == Status.OK and share >= course.SLOW)
     ]
     assert way is max(ways, key=lambda some: some[:2])[2]
+
+
+def test_searches_that_are_left_out_would_have_found_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no way is good enough for a snake that stands upright, one that crouches is asked only where some moves go
+    upright alone: under a high ceiling before a wall none does."""
+    wall, stairs = [(-1e3, 0.0), (1.2, 0.5)], [(-1e3, 0.0), (1.2235, 0.0141), (1.375, -0.0245), (1.7362, 0.0109)]
+    under = [(-1e3, 0.7), (1.3, 0.19685)]
+    low = [(-1e3, 0.25), (1.3, 0.1), (1.5, 0.015)]
+    counts = []
+    for floor, roof in ((wall, [(-1e3, 2.0)]), (wall, [(-1e3, 0.9), (0.9, 0.8)]), (wall[:1], low), (stairs, under)):
+        snake = InchingSnake.of(THREE, 3, None)
+        track = Track.of(bp.Profile(floor, roof), (0.0, 0.0), 0.0)
+        walker = Walker(snake, track, snake.demands(np.inf), 0.02, 0.006)
+        start = walker.stand(snake.tail + np.array([0.0, 0.4, 0.8]))
+        found, searches = [], []
+        for every in (False, True):
+            made: list[Way] = []
+
+            def counted(*args: Any, made: list[Way] = made, **options: Any) -> Way:
+                made.append(search(*args, **options))
+                return made[-1]
+
+            with monkeypatch.context() as patch:
+                patch.setattr(course, "search", counted)
+                if every:
+                    patch.setattr(Walker, "noted", property(lambda _: np.ones(1, dtype=bool)))
+                found.append(course._way_on(walker, start, "wave", 12, 0.126)[0])
+            searches.append(len(made))
+        one, other = found
+        assert (one.status, one.reason, len(one.moves)) == (other.status, other.reason, len(other.moves))
+        for a, b in zip(one.moves, other.moves, strict=True):
+            for name in ("before", "after", "lift", "early"):
+                np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+        counts.append(searches)
+    assert counts == [[5, 10], [5, 10], [10, 10], [10, 10]]

@@ -253,10 +253,13 @@ def _way_on(walker: Walker, start: Array, schedule: str, wanted: int, pace: floa
     were tried. Where narrow ones find none under a ceiling the snake comes to low places stretched."""
     walkers = [Landings(walker)]
     if np.isfinite(walker.track.steps.roof_z).any():
-        walkers.append(Landings(replace(walker, crouch=float(walker.demands.straight.max()))))
+        crouching = replace(walker, crouch=float(walker.demands.straight.max()))
+        walkers = [Landings(replace(crouching, upright=True)), Landings(crouching)]
     tried, far = 0, wanted * pace
     ways: list[Way] = []
     for each, breadth in [*product(walkers, NARROW), *product(walkers, [WIDE])]:
+        if each is not walkers[0] and not walkers[0].walker.noted[0]:
+            continue  # crouching has made no difference: it would find the same
         way = search(each, start, schedule, wanted, pace, breadth, partly=breadth is WIDE)
         tried += way.tried
         share = (way.far - float(start[:, 0].mean())) / far if far > 0.0 else 1.0

@@ -36,7 +36,8 @@ class Steps(NamedTuple):
 class Keeps(NamedTuple):
     """What the body keeps from the ground, m: axes of feet above the floor ``rest``, links ``body`` and their
     ``margin`` more from edges, tail and head links ``low`` more; joints ``top`` from the ceiling; lengths ``tail`` and
-    ``head``; ``crouch`` as in ``Walker``, NaN for none; ``lift`` at least; ``size`` of the longest link."""
+    ``head``; ``crouch`` as in ``Walker``, NaN for none; ``lift`` at least; ``size`` of the longest link. ``upright``:
+    it need not crouch, and ``noted`` (1,) becomes True where it would have had to for a move that is tried."""
 
     rest: float
     body: float
@@ -48,6 +49,8 @@ class Keeps(NamedTuple):
     crouch: float
     lift: float
     size: float
+    upright: bool
+    noted: BoolArray
 
 
 class Places(NamedTuple):
@@ -234,16 +237,22 @@ def into_ground(steps: Steps, keeps: Keeps, pose: Pose, only: int, met: float) -
     return floor, ceiling
 
 
-@inlined
-def _crouched(steps: Steps, keeps: Keeps, pose: Pose, at: Array) -> bool:
-    """Whether the body is higher than the lowest place near anchors ``at`` (N, 2) leaves room for."""
+@lean
+def _room_near(steps: Steps, keeps: Keeps, at: Array) -> float:
+    """How high m a body may be that the lowest place near anchors ``at`` (N, 2) leaves room for."""
+    room = room_above(steps, at[0, 0] - keeps.crouch, at[len(at) - 1, 0] + keeps.crouch)
+    return room - keeps.rest - keeps.top - keeps.margin
+
+
+@lean
+def _tall(pose: Pose) -> float:
+    """m from the lowest anchor to the highest elbow."""
     low, high = pose.anchors[0, 1], -np.inf
     for i in range(len(pose.anchors)):
         low = min(low, pose.anchors[i, 1])
         if i < len(pose.anchors) - 1:
             high = max(high, pose.origins[2 * i + 2, 1])
-    room = room_above(steps, at[0, 0] - keeps.crouch, at[len(at) - 1, 0] + keeps.crouch)
-    return bool(high - low - (room - keeps.rest - keeps.top - keeps.margin) > 0.0)
+    return float(high - low)
 
 
 @njit(cache=True)
@@ -283,7 +292,9 @@ def try_move(
     first, met_all, floor, ceiling = -1, True, False, False
     for d in range(len(out)):
         out[d] = False
-    even = places.even
+    even, room = places.even, np.nan
+    near_low = not np.isnan(keeps.crouch)
+    crouches, watched = near_low and not keeps.upright, near_low and keeps.upright and not (every or keeps.noted[0])
     for p in range(count):
         at, new, parts = places.order[p], pose.fresh[0], pose.fresh[1]
         tau = places.tau[at]
@@ -298,12 +309,16 @@ def try_move(
             floor_here, ceiling_here = into_ground(steps, keeps, pose, only, met)
             floor, ceiling = floor or floor_here, ceiling or ceiling_here
             bad = not every and (floor_here or ceiling_here)
-        if not np.isnan(keeps.crouch):
-            low = _crouched(steps, keeps, pose, before[m])
-            if tau == 1.0:
-                low = low or _crouched(steps, keeps, pose, after[m])
-            out[CEILING] = out[CEILING] or low
-            bad = bad or low
+        if crouches or (watched and not bad):
+            if np.isnan(room):
+                room = _room_near(steps, keeps, before[m])
+            tall = _tall(pose)
+            low = tall - room > 0.0 or (tau == 1.0 and tall - _room_near(steps, keeps, after[m]) > 0.0)
+            if crouches:
+                out[CEILING] = out[CEILING] or low
+                bad = bad or low
+            elif low:
+                keeps.noted[0], watched = True, False
         if bad and first < 0:
             first = p
             if not every:

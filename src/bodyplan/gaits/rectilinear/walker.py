@@ -48,8 +48,9 @@ Why = Counter[tuple[str, Status]]
 class Walker:
     """A snake on steps: what its moves must keep to. ``lift`` m at least; ``margin`` m that the body keeps from the
     edges of steps and from the ceiling. ``crouch`` m: a snake that is nearer than this to a low place moves as if it
-    were under it with its whole body (None: it may stand tall up to the edge). ``short`` (N - 1,) m: no leg is made
-    shorter where it need not be, so that the next anchor has room to rise."""
+    were under it with its whole body (None: it may stand tall up to the edge); with ``upright`` it need not, but what
+    is ``noted`` tells whether that has made a difference. ``short`` (N - 1,) m: no leg is made shorter where it need
+    not be, so that the next anchor has room to rise."""
 
     snake: InchingSnake
     track: Track
@@ -58,6 +59,12 @@ class Walker:
     margin: float
     crouch: float | None = None
     short: Array | None = None
+    upright: bool = False
+
+    @cached_property
+    def noted(self) -> BoolArray:
+        """(1,) whether a move that goes upright would not have gone crouching."""
+        return np.zeros(1, dtype=bool)
 
     @cached_property
     def keeps(self) -> Keeps:
@@ -83,6 +90,8 @@ class Walker:
             np.nan if self.crouch is None else float(self.crouch),
             float(self.lift),
             float(snake.links.max()),
+            bool(self.upright),
+            self.noted,
         )
 
     def stand(self, s: Array) -> Array:
