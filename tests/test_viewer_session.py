@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from time import sleep
 from typing import Any, ClassVar
 
 import numpy as np
@@ -186,7 +187,9 @@ def test_a_slider_plans_anew_and_the_judge_follows(bench: Bench, motion: bp.Moti
     assert first.motion is motion and first.report is not None and first.number == 0
     bench.ask(0.2)
     state = bench.idle()
-    assert state.motion.facts["speed"] == 0.2 and state.number == 1 and not state.problem
+    assert state.motion.facts["speed"] == 0.2 and not state.problem
+    # nobody knows yet what a plan takes: few times first
+    assert bench.calls == [(0.2, True), (0.2, False)] and state.number == 2
     assert state.report is not None and state.report.to_dict() == bp.check(state.motion).to_dict()
     assert bench.session.gait == changed(bench.session.source.gait, {("speed",): 0.2})  # type: ignore[arg-type]
 
@@ -251,6 +254,16 @@ def test_a_refused_plan_says_why_and_keeps_the_last_good_one(bench: Bench, motio
     assert not state.problem and state.motion.facts["speed"] == 0.25
 
 
+def test_plans_that_have_no_fewer_times_are_made_once(motion: bp.Motion) -> None:
+    bench = Bench(motion, previews=False)
+    bench.ask(0.2)
+    bench.idle()
+    bench.ask(0.3)
+    assert bench.idle().number == 2
+    assert bench.calls == [(0.2, False), (0.3, False)]
+    bench.session.stop()
+
+
 def test_heavy_plans_are_first_made_for_few_times(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     bench.ask(0.2)
     bench.idle()
@@ -260,6 +273,25 @@ def test_heavy_plans_are_first_made_for_few_times(bench: Bench, monkeypatch: pyt
     state = bench.idle()
     assert bench.calls == [(0.3, True), (0.3, False)]
     assert not state.preview and state.report is not None and state.motion.facts["speed"] == 0.3
+
+
+def test_a_plan_after_its_preview_is_no_measure_of_the_next(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planners remember: what the preview found makes the whole plan fast, and the next one begins from nothing."""
+    monkeypatch.setattr(session, "FLUENT", 0.3)
+    seen: set[float] = set()
+
+    def remembers(speed: float) -> bp.Motion:
+        if speed not in seen:
+            sleep(0.4)
+        seen.add(speed)
+        return bench.session.source.motion.replace(facts={"speed": speed})
+
+    bench.answer = remembers
+    for speed in (0.2, 0.3, 0.4, 0.5):
+        bench.ask(speed)
+        bench.idle()
+    few, whole = True, False
+    assert bench.calls == [(0.2, few), (0.2, whole), (0.3, whole), *((v, f) for v in (0.4, 0.5) for f in (few, whole))]
 
 
 def test_a_preview_that_fails_in_full_goes_back(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

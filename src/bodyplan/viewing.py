@@ -71,15 +71,17 @@ def mission_source(mission: Mission) -> Source:
         trial: Trial = simulate_mission(mission, motion, progress)
         return trial
 
+    motion = plan_mission(mission)
     executable = mission.simulate is not None and bool(mission.robot.contacts)
     return Source(
         mission.title,
         mission.name,
-        plan_mission(mission),
+        motion,
         mission.gait,
         again,
         execute if executable else None,
         outcome,
+        previews=len(fewer(motion.t)) < len(motion.t),
     )
 
 

@@ -47,6 +47,7 @@ def source_of(motion: Motion, trial: Trial | None = None) -> Source:
         _physics(trial) if executable else None,
         outcome,
         trial,
+        previews=len(fewer(motion.t)) < len(motion.t),
     )
 
 

@@ -6,6 +6,7 @@ and read :attr:`Session.state`.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -35,8 +36,6 @@ from bodyplan.simulate.trial import Trial
 
 #: s: a plan that takes longer is first made for fewer times; one that still does waits until the hand rests so long
 FLUENT, SLOW, REST = 0.06, 0.25, 0.25
-#: share of the time of a plan that one for fewer times may take to be worth it
-WORTH = 0.7
 #: s without a new wish until the plan at hand is made for all times and checked
 SETTLED = 0.35
 
@@ -46,8 +45,8 @@ class Source:
     """What a session can do, given by whoever opens it.
 
     ``plan(gait, preview)``: the motion of a gait, for few times where ``preview``; None where there is no gait to
-    change. ``simulate(motion, progress)``: its trial; None where there is no physics. ``outcome``: what a report of a
-    motion, its checks and its trial is written from.
+    change. ``previews``: whether few times are fewer. ``simulate(motion, progress)``: its trial; None where there is no
+    physics. ``outcome``: what a report of a motion, its checks and its trial is written from.
     """
 
     title: str
@@ -58,6 +57,7 @@ class Source:
     simulate: Callable[[Motion, Callable[[float], None]], Trial] | None = None
     outcome: Callable[[Gait | None, Motion, Report, Trial | None], Outcome] | None = None
     trial: Trial | None = None
+    previews: bool = True
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,8 @@ class _Wish:
     gait: Gait
     number: int
     preview: bool
+    #: after a preview, of which the planner may remember much
+    again: bool = False
 
 
 @dataclass
@@ -110,7 +112,7 @@ class Session:
         self._wish = 0
         self._gait = self._shown_gait = source.gait
         self._good: tuple[Gait | None, Motion] = (source.gait, source.motion)
-        self._cost: dict[bool, float] = {False: 0.0, True: 0.0}
+        self._cost: dict[bool, float] = {False: math.inf, True: 0.0}
         self._stop_physics = threading.Event()
         self._state = State(source.motion, trial=source.trial, problem=trouble(source.motion), checking=True)
         self._planner: Latest[_Wish] = Latest(self._plan, "plan")
@@ -148,8 +150,7 @@ class Session:
         with self._lock:
             self._wish += 1
             self._gait = wanted
-            full, few = self._cost[False], self._cost[True]
-            preview = full > FLUENT and few < WORTH * full
+            preview = self.source.previews and self._cost[False] > FLUENT
             wait = REST if self._cost[preview] > SLOW else 0.0
             self._judge.forget()
             self._planner.ask(_Wish(wanted, self._wish, preview), wait)
@@ -217,7 +218,7 @@ class Session:
             motion, problem = None, f"{type(error).__name__}: {error}"
         took = perf_counter() - begin
         with self._lock:
-            if motion is not None:
+            if motion is not None and (not wish.again or self._cost[False] == math.inf):
                 self._cost[wish.preview] = took
             latest = wish.number == self._wish
             if motion is None or problem:
@@ -246,7 +247,7 @@ class Session:
             if not latest:
                 return
             if wish.preview:
-                self._planner.ask(replace(wish, preview=False), SETTLED)
+                self._planner.ask(replace(wish, preview=False, again=True), SETTLED)
             else:
                 self._judge.ask((motion, self._state.number), SETTLED)
                 if self._state.physics_waits:

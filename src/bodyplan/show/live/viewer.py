@@ -14,8 +14,9 @@ from bodyplan.show.live.session import Session, Source, State
 from bodyplan.show.live.stage import Shown, Stage
 from bodyplan.show.live.tracks import Tracks
 
-#: pictures a second, and how often the time is written beside them
-RATE, READOUTS = 30.0, 8.0
+#: pictures a second, and how often the time is written beside them; pictures while a plan is being made, which they
+#: would hold up
+RATE, READOUTS, PLANNING_RATE = 30.0, 8.0, 10.0
 #: longest step of the clock, s: after a pause of the machine the motion goes on where it was
 LONGEST = 0.2
 
@@ -110,7 +111,8 @@ class Viewer:
                     self._told = now
                     self.panel.at(self.time, self.tracks.duration, self.tracks.stages(self.time))
             # no faster than the pictures, however often something changes
-            self._stopped.wait(max(0.0, 1.0 / RATE - (monotonic() - now)))
+            rate = PLANNING_RATE if self.session.state.planning else RATE
+            self._stopped.wait(max(0.0, 1.0 / rate - (monotonic() - now)))
 
     def _move(self, step: float) -> None:
         panel, end = self.panel, self.tracks.duration
