@@ -6,6 +6,11 @@ really change between plans, so that no plan is taken from a cache.
 
     python benchmarks/bench_replan.py [MISSION ...]
 
+With ``--values N`` every slider goes over its whole range in N values instead, and the few times of all of them are
+told: searches may take much longer for some values than for those next to the present one.
+
+    python benchmarks/bench_replan.py inching-stairs --values 12
+
 These are absolute times, of no other use than to see which missions follow the hand: noise of the machine included.
 """
 
@@ -50,12 +55,49 @@ def one(source: Source, preview: bool) -> dict[str, float]:
     return out
 
 
+def spread(source: Source, values: int) -> dict[tuple[str, float], float]:
+    """Seconds of a re-plan by slider and value over the whole ranges; what is refused is left out."""
+    gait, plan = source.gait, source.plan
+    assert gait is not None and plan is not None
+    out = {}
+    for parameter in parameters_of(gait, Scale.of(source.motion)):
+        steps = round((parameter.high - parameter.low) / parameter.step)
+        for k in sorted({round(steps * share / (values - 1)) for share in range(values)}):
+            value = min(parameter.low + k * parameter.step, parameter.high)
+            try:
+                wanted = changed(gait, {parameter.key: parameter.si(value)})
+                begin = perf_counter()
+                plan(wanted, True)
+                out[parameter.label, value] = perf_counter() - begin
+            except BodyplanError:
+                continue
+    return out
+
+
+def tell(name: str, found: dict[tuple[str, float], float]) -> None:
+    """Print how long all of them took, and which took longer than the aim."""
+    times = [1e3 * seconds for seconds in found.values()]
+    shares = statistics.quantiles(times, n=20)
+    above = [f"{label} {value:g}: {1e3 * s:.0f} ms" for (label, value), s in found.items() if s > AIM]
+    row = f"{name:22} {len(times):5} {statistics.median(times):9.0f} ms {shares[17]:6.0f} ms {shares[18]:6.0f} ms"
+    print(f"{row} {max(times):6.0f} ms  {'; '.join(above)}", flush=True)
+
+
 def main() -> None:
     """Print a line a mission."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("missions", nargs="*", default=None)
+    parser.add_argument("--values", type=int, default=None, help="so many values over the range of every slider")
+    asked = parser.parse_args()
+    if asked.values is not None:
+        print(f"{'mission':22} {'plans':>5} {'few: median':>12} {'90 %':>9} {'95 %':>9} {'worst':>9}  above the aim")
+        for name in asked.missions or ready_missions():
+            source = mission_source(load_mission(name))
+            one(source, True)
+            tell(name, spread(source, max(asked.values, 2)))
+        return
     print(f"{'mission':22} {'few: median':>12} {'worst':>8}  {'all: median':>12}  slowest slider")
-    for name in parser.parse_args().missions or ready_missions():
+    for name in asked.missions or ready_missions():
         source = mission_source(load_mission(name))
         # as the viewer does when it starts
         memory.hold()
