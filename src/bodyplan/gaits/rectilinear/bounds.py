@@ -133,11 +133,11 @@ def lay(
 
 
 @inlined
-def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: Array) -> None:
+def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: Array) -> bool:
     """How far a pose is beyond every one of :data:`DEMANDS`, relative to links or as a share of pi, into ``out`` (7,);
     not positive where it is met, -inf where it is not asked for or the leg is not known. ``swinging`` (N,): the anchors
-    that do not carry. What comes after a demand that it is beyond by more than ``enough`` is left at -inf; unless that
-    is infinite, legs that were not moved are within it."""
+    that do not carry. What comes after a demand that it is beyond by more than ``enough`` is left at -inf, and True is
+    the result; unless that is infinite, legs that were not moved are within it."""
     links, legs, size = bounds.links, len(bounds.links) // 2, bounds.size
     for d in range(len(out)):
         out[d] = -np.inf
@@ -159,20 +159,19 @@ def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: 
             if not np.isnan(top):
                 out[ELBOWS] = max(out[ELBOWS], (top - low - bounds.ceiling) / size)
         known = known and not np.isnan(top)
-    for d in range(len(out)):
-        if out[d] > enough:
-            return
+    if max(out[REACH], out[COLLAPSED], out[ELBOWS], out[ANCHORS]) > enough:
+        return True
     if not np.isnan(bounds.margin) and known:
         out[TIPS] = (bounds.margin - _margin(bounds, swinging, pose)) / size
         if out[TIPS] > enough:
-            return
+            return True
     if bounds.limited:
         for j in range(2 * legs + 1):
             q = pose.angles[j + 1] - pose.angles[j]
             if not np.isnan(q):
                 out[LIMIT] = max(out[LIMIT], (bounds.limits[j, 0] - q) / np.pi, (q - bounds.limits[j, 1]) / np.pi)
         if out[LIMIT] > enough:
-            return
+            return True
     if len(bounds.link) and known:
         # of those that are clear of each other it does not matter by how much where only that is asked
         least = -bounds.most if enough == np.inf else 0.0
@@ -188,6 +187,8 @@ def excess(bounds: Bounds, swinging: BoolArray, pose: Pose, enough: float, out: 
                 pose.work,
             )  # fmt: skip
         out[COLLAPSED], out[CROSSING] = max(out[COLLAPSED], own / size), other / size
+        return bool(max(out[COLLAPSED], out[CROSSING]) > enough)
+    return False
 
 
 @lean

@@ -299,11 +299,11 @@ def try_move(
         at, new, parts = places.order[p], pose.fresh[0], pose.fresh[1]
         tau = places.tau[at]
         lay(bounds, before, after, lift, early, m, tau, (even[at, 0], even[at, 1], even[at, 2]), only, pose)
-        excess(bounds, swinging, pose, enough, found)
-        bad = False
-        for d in range(len(DEMANDS)):
-            if found[d] > met:
-                out[d] = bad = True
+        bad = excess(bounds, swinging, pose, enough, found)
+        if bad or every:
+            for d in range(len(DEMANDS)):
+                if found[d] > met:
+                    out[d] = bad = True
         met_all = met_all and not bad
         if met_all:
             floor_here, ceiling_here = into_ground(steps, keeps, pose, only, met)
