@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import importlib
 import sys
+from contextlib import suppress
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -142,6 +144,12 @@ class _Face(ModuleType):
 
 
 sys.modules[__name__].__class__ = _Face
+
+if (Path(__file__).parents[2] / ".git").exists():  # a checkout: an update leaves kernels of other sources behind
+    from bodyplan.stale import forget_stale
+
+    with suppress(OSError):
+        forget_stale(Path(__file__).parent)
 
 
 def __getattr__(name: str) -> Any:
