@@ -7,13 +7,13 @@ of the curve. Cells end at ``curve.breaks`` and are halved until two halves agre
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-from bodyplan.arrays import Array, IntArray, finite, frozen
+from bodyplan.arrays import Array, finite, frozen
 from bodyplan.errors import InputError, SolveError, Status
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ ORDER = 16
 KEPT, MOST = 32768, 500_000
 #: rad that the polynomial of a cell may be off, if the halves did not replace it
 TOLERANCE = 1e-14
-#: intervals of one evaluation: keeps the working memory small
-CHUNK = 16384
 
 #: Gauss-Legendre rule on [-1, 1]
 NODES, WEIGHTS = (frozen(values) for values in legendre.leggauss(ORDER))
@@ -34,6 +32,8 @@ NODES, WEIGHTS = (frozen(values) for values in legendre.leggauss(ORDER))
 _FIT = 0.5 * (2.0 * np.arange(ORDER)[:, None] + 1.0) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
 #: values at the nodes -> Legendre coefficients (ORDER + 1, ORDER) of the antiderivative from -1 on
 ANTIDERIVATIVE = frozen(np.stack([legendre.legint(row, lbnd=-1) for row in np.eye(ORDER)], axis=1) @ _FIT)
+# factors (ORDER + 1, 2) of Clenshaw's recurrence for Legendre polynomials
+_CLENSHAW = np.array([[(2.0 * k - 1.0) / k, (k - 1.0) / k] if k else [0.0, 0.0] for k in range(ORDER + 1)])
 #: values at the nodes -> values of the polynomial at the nodes of the two halves
 HALVES = frozen(legendre.legvander(np.concatenate([0.5 * NODES - 0.5, 0.5 * NODES + 0.5]), ORDER - 1) @ _FIT)
 
@@ -57,14 +57,14 @@ def shape_integral(curve: BodyCurve, a: ArrayLike, b: ArrayLike) -> Shape:
     from bodyplan.curves.base import Shape  # the contract imports this module
 
     first, last = interval(a, b)
+    shape = first.shape
     if not first.size:
-        return Shape(np.zeros(first.shape), np.zeros(first.shape), np.zeros(first.shape))
+        return Shape(np.zeros(shape), np.zeros(shape), np.zeros(shape))
     table = _table(curve, float(min(first.min(), last.min())), float(max(first.max(), last.max())))
-    x, y = first.ravel(), last.ravel()
-    out = np.concatenate(
-        [table.between(x[i : i + CHUNK], y[i : i + CHUNK]) for i in range(0, len(x), CHUNK)],
-    )
-    return Shape(*(column.reshape(first.shape) for column in out.T))
+    # as often as they were given, not as often as they are broadcast
+    (start, begun), (end, ended) = (table.at(np.asarray(v, dtype=np.float64)) for v in (a, b))
+    turned = np.asarray((end - start) + (ended - begun), dtype=np.float64)
+    return Shape(*(np.broadcast_to(turned[..., i], shape).copy() for i in range(3)))
 
 
 class _Table:
@@ -74,23 +74,23 @@ class _Table:
         """``edges`` (C + 1,) m of the cells; ``values`` (C, ORDER, 3) rad/m of the shape at their nodes."""
         self.edges, self.values = edges, values
         half = 0.5 * np.diff(edges)
-        self.series = np.einsum("kn,cnj->kjc", ANTIDERIVATIVE, values) * half  # (ORDER + 1, 3, C)
+        self.series = np.einsum("kn,cnj,c->ckj", ANTIDERIVATIVE, values, half)  # (C, ORDER + 1, 3)
         # sums in extended precision where the machine has it: differences of them are what counts
         ends = np.zeros((len(edges), 3), dtype=np.longdouble)
         np.cumsum(np.einsum("n,cnj,c->cj", WEIGHTS, values, half), axis=0, dtype=np.longdouble, out=ends[1:])
         self.ends = ends
 
-    def between(self, a: Array, b: Array) -> Array:
-        """(N, 3) rad from a to b (N,)."""
-        (i, x), (j, y) = self._at(a), self._at(b)
-        return np.asarray((self.ends[j] - self.ends[i]) + (y - x), dtype=np.float64)
+    def at(self, s: Array) -> tuple[Any, Array]:
+        """Integrals (..., 3) rad from the first edge to the start of the cell of each place s (...) m, in extended
+        precision, and from there to the place."""
+        from bodyplan.curves.quadrature_kernel import series_at
 
-    def _at(self, s: Array) -> tuple[IntArray, Array]:
-        """Cells (N,) of places s (N,) and the integrals (N, 3) from the start of the cell."""
-        cell = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.edges) - 2)
+        flat = s.ravel()
+        cell = np.clip(np.searchsorted(self.edges, flat, side="right") - 1, 0, len(self.edges) - 2)
         low, high = self.edges[cell], self.edges[cell + 1]
-        x = 2.0 * (s - low) / (high - low) - 1.0
-        return cell, np.asarray(legendre.legval(x, self.series[:, :, cell], tensor=False)).T
+        out = np.empty((len(flat), 3))
+        series_at(self.series, cell, 2.0 * (flat - low) / (high - low) - 1.0, _CLENSHAW, out)
+        return self.ends[cell].reshape(*s.shape, 3), out.reshape(*s.shape, 3)
 
 
 def _table(curve: BodyCurve, low: float, high: float) -> _Table:
