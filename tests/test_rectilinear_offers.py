@@ -172,6 +172,20 @@ def test_what_is_offered_is_what_brute_force_finds() -> None:
     assert some - plain > 30, "swings over edges are among them"
 
 
+def test_no_more_edges_are_in_reach_than_there_is_room_for() -> None:
+    """Of stances in a long flight of stairs: all places are among the spots."""
+    floor = [(-1e3, 0.0), *((0.3 + 0.037 * k, 0.001 * (k % 2)) for k in range(200))]
+    snake = InchingSnake.of(FIVE, 5, None)
+    walker = Walker(snake, Track.of(bp.Profile(floor), (0.0, 0.0), 0.0), snake.demands(np.inf, 0.0), 0.03, 0.0)
+    ranges, rng, most = walker.ranges, np.random.default_rng(3), 0
+    for _ in range(200):
+        gaps = rng.uniform(0.2, 1.0, 4) ** rng.uniform(0.0, 1.0) * walker.demands.straight
+        here = walker.stand(rng.uniform(0.0, 5.0) + np.concatenate([[0.0], np.cumsum(gaps)]))
+        for i in range(5):
+            most = max(most, len(places(ranges, module.SPOTS, here, i)) - module.SPOTS)
+    assert 0.8 * ranges.crowd < most <= ranges.crowd < 0.2 * np.diff(ranges.first).max()
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_what_stands_is_looked_at_once_and_nothing_is_missed(seed: int) -> None:
     """Moves of any anchors, most of which run into something: whether the first thing is looked for, where what does

@@ -22,13 +22,15 @@ AT_EDGE = 1e-12
 class Ranges(NamedTuple):
     """Where anchors may land: legs are at most ``straight`` (N - 1,) m, and neighbouring anchors ``nearest`` m from
     each other; no leg need be shorter than ``short`` (N - 1,) m. ``edges`` (E,) m: places that matter beside the edges
-    of steps, those of anchor i ascending from ``first[i]`` to ``first[i + 1]`` (N + 1,)."""
+    of steps, those of anchor i ascending from ``first[i]`` to ``first[i + 1]`` (N + 1,), at most ``crowd`` of them in
+    reach at once."""
 
     straight: Array
     nearest: float
     short: Array
     edges: Array
     first: IntArray
+    crowd: int
 
 
 class Choice(NamedTuple):
@@ -61,7 +63,7 @@ class Offers(NamedTuple):
 
 def offers_for(ranges: Ranges, choice: Choice, here: Array, size: int) -> Offers:
     """Room for what is offered to a phase of ``size`` anchors of stances ``here`` (S, N, 2)."""
-    most = choice.spots + int(np.diff(ranges.first).max()) + choice.closer * choice.rounds
+    most = choice.spots + ranges.crowd + choice.closer * choice.rounds
     shape = (len(here), size)
     known, last, at = (np.empty(some, dtype=np.int64) for some in ((*shape, most), shape, shape))
     order = np.empty((*shape, len(choice.places.order)), dtype=np.int64)
@@ -82,13 +84,13 @@ def reach(ranges: Ranges, here: Array, i: int) -> float:
 @lean
 def places_of(ranges: Ranges, count: int, here: Array, i: int, out: Array) -> int:
     """Places where anchor ``i`` of ``here`` (N, 2) might land, ascending, into ``out``: ``count`` at equal steps up to
-    its reach, and those at edges; how many they are."""
+    its reach, and those at edges; how many they are (no more than there is room for)."""
     start, far = here[i, 0], reach(ranges, here, i)
     k = 1 if far > start else count + 1
     e, last, n = ranges.first[i], ranges.first[i + 1], 0
     while e < last and ranges.edges[e] <= start:
         e += 1
-    while k <= count or (e < last and ranges.edges[e] < far):
+    while n < len(out) and (k <= count or (e < last and ranges.edges[e] < far)):
         even = start + (far - start) * k / count if k <= count else np.inf
         if e < last and ranges.edges[e] < min(even, far):
             out[n] = ranges.edges[e]
@@ -234,7 +236,7 @@ def farthest(
     short where one of these goes. Into ``out`` (S, A, N, 4) that move and the next ones behind it, ``told`` (S,) of
     them."""
     trial = trial_of(bounds, offers.here[0], choice.places)
-    at = np.empty(offers.spots.shape[2])
+    at = np.empty(offers.spots.shape[2] - choice.closer * choice.rounds)
     for b in range(len(offers.here)):
         here, some = offers.here[b], False
         for g in range(len(group)):

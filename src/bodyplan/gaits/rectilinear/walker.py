@@ -190,7 +190,11 @@ class Walker:
         first = np.concatenate([[0], np.cumsum([len(some) for some in edges])]).astype(np.int64)
         straight = np.array(self.demands.straight)
         short = np.full(len(straight), -np.inf) if self.short is None else np.array(self.short)
-        return Ranges(straight, float(self.demands.nearest), short, np.concatenate(edges), first)
+        # no anchor lands farther from where it stands than a straight leg
+        far = float(straight.max()) * (1.0 + 1e-9)
+        crowds = [np.searchsorted(some, some + far, side="right") - np.arange(len(some)) for some in edges]
+        crowd = max((int(some.max()) for some in crowds if len(some)), default=0)
+        return Ranges(straight, float(self.demands.nearest), short, np.concatenate(edges), first, crowd)
 
     @cached_property
     def _beside_edges(self) -> list[Array]:
