@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 #: what the files of kernels contain, and no others
-_MARKS = ("from numba import", "bodyplan.kernels import")
+_MARKS = ("from numba import", "bodyplan.kernels import", "bodyplan.spatial.lanes import")
 #: where the state of files is kept from which the compiled kernels come
 _RECORD = Path("__pycache__") / "kernels.json"
 
