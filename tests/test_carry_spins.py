@@ -146,3 +146,32 @@ def test_angles_over_jumps_are_exact() -> None:
     columns = [ROBOT.joint_index(f"{name}.spin") for name in ("fl", "fr", "r")]
     off = over_valleys(t).q[:, columns] - over_valleys(fine).q[::20, columns]
     assert np.abs(off).max() < 1e-8
+
+
+def test_contacts_that_become_one_while_they_are_followed() -> None:
+    """A ramp over smooth waves: no jump is found, and nothing warns."""
+    path = {"kind": "line", "start": (0.0, 0.0), "heading": 0.2}
+    gait = bp.Carry(path, height=0.16, speed=0.05, ramp=0.58)
+    assert bp.plan(ROBOT, gait, bp.Surface("0.02*sin(6*x+y)"), np.arange(0.0, 1.2, 0.05)).ok
+
+
+def off_finer(ground: bp.Surface, height: float, speed: float) -> float:
+    """Largest difference rad of hub angles from those with times 40 times finer."""
+    t = np.arange(0.0, 2.0, 0.05)
+    fine = np.linspace(0.0, t[-1], 40 * (len(t) - 1) + 1)
+    gait = bp.Carry("line", height=height, speed=speed)
+    columns = [ROBOT.joint_index(f"{name}.spin") for name in ("fl", "fr", "r")]
+    some, all_ = (bp.plan(ROBOT, gait, ground, times).q[:, columns] for times in (t, fine))
+    return float(np.abs(some - all_[::40]).max())
+
+
+def test_short_waves_at_speed() -> None:
+    """Panels as long as the waves are wide: those that were good enough beside the worst ones are cut when these are
+    done."""
+    assert off_finer(bp.Surface("0.01*sin(20*x+3*y)"), 0.16, 2.0) < 2e-6
+    assert off_finer(bp.Surface("0.01*sin(10*x+3*y)"), 0.16, 1.0) < 1e-11
+
+
+def test_a_third_contact_is_nearer_than_the_two_that_were_followed() -> None:
+    """Two jumps within a panel: no cut where another place is nearer."""
+    assert off_finer(VALLEYS, 0.17, 1.0) < 5e-3

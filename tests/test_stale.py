@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import bodyplan as bp
-from bodyplan.stale import forget_stale
+from bodyplan.stale import forget_stale, forget_stale_of_checkout
 
 SOURCES = {
     "__init__.py": "",
@@ -95,6 +95,32 @@ def test_kernels_of_unknown_age_are_forgotten(package: Path) -> None:
     (package / "__pycache__" / "kernels.json").write_text("no json")
     forget_stale(package)
     assert left(package) == set()
+
+
+def test_what_cannot_be_read_is_passed_over(package: Path) -> None:
+    (package / "half.py").write_text("from numba import njit\n<<<<<<< HEAD\n")
+    (package / "latin.py").write_bytes(b"# from numba import \xe9\n")
+    (package / ".#lock.py").symlink_to(package / "nowhere")
+    (package / "folder.py").mkdir()
+    (package / "deep.py").write_text("from numba import njit\n" + "(" * 5000)
+    touch(package / "sizes.py")
+    assert {path.stem for path in forget_stale(package)} >= {"inner", "outer"}
+    assert left(package) == {"other", "part/deep"}
+
+
+@pytest.mark.parametrize("record", ['{"a\\u0000b": [1, 2]}', "[" * 100_000, "[1]", "{}", '{"sizes.py": 3}'])
+def test_broken_records(package: Path, record: str) -> None:
+    (package.parent / ".git").mkdir()
+    (package / "__pycache__" / "kernels.json").write_text(record)
+    forget_stale_of_checkout(package)
+    assert left(package) <= set(KERNELS)
+
+
+def test_no_checkout_is_left_alone(package: Path) -> None:
+    touch(package / "sizes.py")
+    forget_stale_of_checkout(package)
+    assert left(package) == set(KERNELS)
+    forget_stale_of_checkout(Path("/bodyplan"))
 
 
 def test_kernels_of_this_package_are_known() -> None:

@@ -57,6 +57,13 @@ def test_one_that_tips_over_decides() -> None:
     points[6, :, 2], normals[6], com[6] = 0.0, [0.0, 0.0, 1.0], [5.0, 0.0, 0.3]
     got = least_of(points, normals, com, 1.0).largest(np.full(10, np.inf))
     assert np.nanmax(got) == np.inf
+    # three contacts in one line hold nothing beside it: mended forces do not balance there
+    points[6] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
+    com[6] = [1.0, 0.3, 0.5]
+    assert least_of(points, normals, com, 1.0).largest(np.full(10, np.inf))[6] == np.inf
+    bound = np.full(10, np.inf)
+    bound[6] = -np.inf
+    assert np.nanmax(least_of(points, normals, com, 1.0).largest(bound)) < 2.0
 
 
 def test_of_no_items_there_is_none() -> None:

@@ -275,6 +275,36 @@ def test_heavy_plans_are_first_made_for_few_times(bench: Bench, monkeypatch: pyt
     assert not state.preview and state.report is not None and state.motion.facts["speed"] == 0.3
 
 
+def test_a_value_that_is_refused_after_a_preview_ends_it(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What waits for the whole plan waits no longer; the last good plan is back, and judged."""
+    monkeypatch.setattr(session, "SETTLED", 2.0)
+    good = bench.session.state.motion
+    bench.session.change({("speed",): 0.3})
+    while not bench.session.state.preview:
+        sleep(0.001)
+    bench.session.change({("speed",): -1.0})
+    state = bench.idle()
+    assert state.motion is good and state.problem and not state.preview
+    assert not state.planning and not state.checking and state.report is not None
+
+
+def test_a_value_that_is_refused_while_a_plan_is_made(bench: Bench, motion: bp.Motion) -> None:
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(speed: float) -> bp.Motion:
+        begun.set()
+        assert go.wait(LONG)
+        return motion.replace(facts={"speed": speed})
+
+    bench.answer = slow
+    bench.session.change({("speed",): 0.3})
+    assert begun.wait(LONG)
+    bench.session.change({("speed",): -1.0})
+    go.set()
+    state = bench.idle()
+    assert state.motion is motion and state.problem and not state.planning and state.report is not None
+
+
 def test_a_plan_after_its_preview_is_no_measure_of_the_next(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """Planners remember: what the preview found makes the whole plan fast, and the next one begins from nothing."""
     monkeypatch.setattr(session, "FLUENT", 0.3)

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import importlib
 import sys
-from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
+
+from bodyplan.stale import forget_stale_of_checkout
 
 if TYPE_CHECKING:
     from bodyplan import curves, export, fitting, gaits, ground, rates, solve, spatial
@@ -145,11 +146,7 @@ class _Face(ModuleType):
 
 sys.modules[__name__].__class__ = _Face
 
-if (Path(__file__).parents[2] / ".git").exists():  # a checkout: an update leaves kernels of other sources behind
-    from bodyplan.stale import forget_stale
-
-    with suppress(OSError):
-        forget_stale(Path(__file__).parent)
+forget_stale_of_checkout(Path(__file__).parent)
 
 
 def __getattr__(name: str) -> Any:

@@ -20,6 +20,13 @@ _MARKS = ("from numba import", "bodyplan.kernels import", "bodyplan.spatial.lane
 _RECORD = Path("__pycache__") / "kernels.json"
 
 
+def forget_stale_of_checkout(package: Path) -> None:
+    """:func:`forget_stale`, if the ``package`` is one of a checkout and its files can be written."""
+    with suppress(Exception):  # nothing here may keep anybody from importing the package
+        if (package.parent.parent / ".git").exists():
+            forget_stale(package)
+
+
 def forget_stale(package: Path) -> list[Path]:
     """Remove compiled kernels of the ``package`` (a folder) that were made from files that are no longer the same;
     returns the sources of those kernels. Raises OSError where files cannot be read or removed."""
@@ -39,13 +46,16 @@ def forget_stale(package: Path) -> list[Path]:
     record = package / _RECORD
     record.parent.mkdir(exist_ok=True)
     passing = record.with_suffix(f".{os.getpid()}")
-    passing.write_text(json.dumps(now), encoding="utf-8")
-    passing.replace(record)
+    try:
+        passing.write_text(json.dumps(now), encoding="utf-8")
+        passing.replace(record)
+    finally:
+        passing.unlink(missing_ok=True)
     return stale
 
 
 def _recorded(record: Path) -> dict[str, list[int]]:
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, RecursionError):
         found = json.loads(record.read_text(encoding="utf-8"))
         if isinstance(found, dict):
             return found
@@ -53,22 +63,33 @@ def _recorded(record: Path) -> dict[str, list[int]]:
 
 
 def _state(path: Path) -> list[int] | None:
-    """Time and size of a file, None where there is none."""
+    """Time and size of a file, None where there is none to be had."""
     try:
         found = path.stat()
-    except FileNotFoundError:
+    except (OSError, ValueError):
         return None
     return [found.st_mtime_ns, found.st_size]
 
 
+def _text(path: Path) -> str:
+    """ "" of what cannot be read, as of a lock that an editor leaves."""
+    with suppress(OSError, ValueError):
+        return path.read_text(encoding="utf-8")
+    return ""
+
+
 def _has_kernels(path: Path) -> bool:
-    text = path.read_text(encoding="utf-8")
+    text = _text(path)
     return any(mark in text for mark in _MARKS)
 
 
 def _taken(package: Path, path: Path) -> Iterator[Path]:
     """The files of the package that a file imports from."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    try:
+        tree = ast.parse(_text(path))
+    except (SyntaxError, ValueError, RecursionError):
+        return  # nobody can import it either
+    for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == package.name:
             module = package.joinpath(*node.module.split(".")[1:])
             for place in (module.with_suffix(".py"), *(module / f"{name.name}.py" for name in node.names)):

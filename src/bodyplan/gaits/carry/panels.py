@@ -94,6 +94,11 @@ class Panels:
         """Some of the panels, (k,)."""
         return Panels(*(getattr(self, f.name)[index] for f in fields(Panels)))
 
+    def join(self, others: Panels) -> Panels:
+        """These, then the others."""
+        pairs = ((getattr(self, f.name), getattr(others, f.name)) for f in fields(Panels))
+        return Panels(*(np.concatenate(pair) for pair in pairs))
+
     def cut(self, when: Array, sides: Array) -> Panels:
         """The parts before ``when`` (n,) s, then those after it; ``sides`` (n, 2, KNOWN) are known just before and just
         after."""

@@ -25,11 +25,11 @@ from bodyplan.ground.field import Field
 #: how often a panel is cut
 HALVINGS = 3
 #: rad: a panel with less error than that, or than this share of the largest error of its wheel, is not cut
-ENOUGH, SHARE = 1e-11, 1e-2
+ENOUGH, SHARE = 1e-11, 2e-2
 #: steps to a jump of the contact; the last one is at most this share of the time in which it is looked for
 _STEPS, _NEAR = 2, 0.1
-#: rad: contacts less apart are one
-_APART = 1e-6
+#: rad: contacts less apart are one; share of a radius by which the nearest one may seem nearer
+_APART, _SAME = 1e-6, 1e-9
 
 
 @dataclass(frozen=True)
@@ -76,20 +76,21 @@ class Hubs:
         for left in range(HALVINGS - 1, -1, -1):
             worst = np.zeros(len(self.wheels))
             np.maximum.at(worst, panels.wheel, doubt)
-            enough = doubt <= np.maximum(ENOUGH, SHARE * worst[panels.wheel])
-            done, rest = np.flatnonzero(enough), np.flatnonzero(~enough)
-            add(panels.take(done), panels.integral(inner[:, :, SPEED])[done])
-            panels, inner = panels.take(rest), inner[rest]
-            if not len(panels):
+            more = doubt > np.maximum(ENOUGH, SHARE * worst[panels.wheel])
+            if not more.any():
                 break
+            cut, rest = panels.take(np.flatnonzero(more)), np.flatnonzero(~more)
+            inside, panels, inner, doubt = inner[more], panels.take(rest), inner[rest], doubt[rest]
             if left:
-                when, sides = self.jumps(panels, inner) if left == HALVINGS - 1 else _nowhere(len(panels))
-                panels, inner = self._cut(panels, when, sides)
-                doubt = panels.doubt(inner[:, :, SPEED])
+                when, sides = self.jumps(cut, inside) if left == HALVINGS - 1 else _nowhere(len(cut))
+                parts, inside = self._cut(cut, when, sides)
+                panels, inner = panels.join(parts), np.concatenate([inner, inside])
+                doubt = np.append(doubt, parts.doubt(inside[:, :, SPEED]))
             else:
                 # as short as they get: without the ends, at which a speed may bend or jump
-                halves = panels.cut(panels.middle, panels.ends)
+                halves = cut.cut(cut.middle, cut.ends)
                 add(halves, halves.integral_of_speeds(self._inner(halves, GAUSS)[:, :, SPEED]))
+        add(panels, panels.integral(inner[:, :, SPEED]))
         return np.asarray(np.cumsum(angle, axis=1).T)
 
     def _inner(self, panels: Panels, at: Array) -> Array:
@@ -114,8 +115,7 @@ class Hubs:
         KNOWN) just before and after; ``inner`` (n, 2, KNOWN) is known at the nodes.
 
         Of the ends and nodes, all of them nearest contacts, two neighbours are on either side of the largest jump: both
-        contacts are followed to the time at which they are as near. Others are not looked at there: whether one is
-        nearer shows at the nodes of the parts.
+        contacts are followed to the time at which they are as near. It is one of a jump if nothing else is nearer then.
         """
         (when, sides), land = _nowhere(len(panels)), self.land
         if not isinstance(land, Field):
@@ -136,7 +136,10 @@ class Hubs:
             good &= np.abs(found[:, 1, ANGLE] - found[:, 0, ANGLE]) > _APART
             good &= (np.abs(step) <= _NEAR * (high - low)) | (left > 0)
             some, low, high, at, found = some[good], low[good], high[good], at[good], found[good]
-        when[some], sides[some] = at, found
+        if len(some):
+            nearest = self.known(panels.wheel[some], at, gains=False)[:, RADIUS]
+            good = nearest >= found[:, :, RADIUS].min(axis=1) * (1.0 - _SAME)
+            when[some[good]], sides[some[good]] = at[good], found[good]
         return when, sides
 
     def _nearer(self, land: Field, wheel: IntArray, when: Array, near: Array) -> tuple[Array, Array]:
@@ -150,8 +153,8 @@ class Hubs:
                 v[:, 0] - v[:, 1] for v in (a.reshape(-1, 2) for a in (found.radius, made.radius, made.radius_rate))
             )
             # Halley's step: of the parabola through the gap
-            step = -gap / grows
-            step = np.where(grows > 0.0, -gap / (grows + 0.5 * gains * step), np.nan)
+            step = -gap / (grows - 0.5 * gains * gap / grows)
+            step = np.where(np.isfinite(step) & (grows > 0.0), step, np.nan)
             at = np.repeat(step, 2)
             columns = [
                 made.rolling + made.rolling_rate * at,

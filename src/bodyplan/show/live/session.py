@@ -145,7 +145,7 @@ class Session:
             with self._lock:
                 self._wish += 1
                 self._planner.forget()
-                self._update(planning=False, problem=str(error), **self._unplanned())
+                self._refuse(str(error), None)
             return
         with self._lock:
             self._wish += 1
@@ -218,15 +218,18 @@ class Session:
             motion, problem = None, f"{type(error).__name__}: {error}"
         took = perf_counter() - begin
         with self._lock:
-            if motion is not None and (not wish.again or self._cost[False] == math.inf):
+            if motion is not None and not wish.again:
                 self._cost[wish.preview] = took
+            elif motion is not None and (self._cost[True] + took <= FLUENT or self._cost[False] == math.inf):
+                # a whole plan at once takes no longer than both
+                self._cost[False] = took
             latest = wish.number == self._wish
             if motion is None or problem:
                 if latest:
                     self._refuse(problem, took)
                 return
-            if not latest and self._planner.waiting and self._cost[wish.preview] > SLOW:
-                return  # nobody waits for it
+            if not latest and (not self._planner.waiting or self._cost[wish.preview] > SLOW):
+                return  # nobody waits for it: the latest wish was refused, or comes soon
             self._stop_physics.set()
             self._shown_gait = wish.gait
             if not wish.preview:
@@ -253,7 +256,7 @@ class Session:
                 if self._state.physics_waits:
                     self.run_physics()
 
-    def _refuse(self, problem: str, took: float) -> None:
+    def _refuse(self, problem: str, took: float | None) -> None:
         """Say why there is no plan, and keep the last good one."""
         gait, motion = self._good
         if self._state.motion is not motion:

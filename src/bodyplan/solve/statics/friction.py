@@ -134,6 +134,10 @@ class LeastFriction:
         items are those of one that was solved, mended, and such as alternating projections find.
         """
         bound, most, known = np.array(bound), -1.0, np.full(self.loads.count, np.nan)
+        unheld = (self.loads.left_over(self._smallest()) > ROUNDING) & (bound > -np.inf)
+        if unheld.any():
+            known[unheld] = np.inf
+            return known
         x = np.zeros((self.loads.count, 3 * self.loads.contacts))
         while bound.max(initial=-np.inf) > most + CLOSE * max(1.0, most):
             i = int(bound.argmax())
@@ -157,6 +161,11 @@ class LeastFriction:
             rest = np.einsum("nij,nj->ni", self.loads.equations, flat) + self.loads.load
             mended = (flat - np.einsum("nij,ni->nj", self._inverse, rest)).reshape(here.shape)
         return np.where(np.isfinite(mended).all(axis=(1, 2)), ratios(mended).max(axis=1), np.inf)
+
+    def _smallest(self) -> Array:
+        """(n, k, 3): the smallest forces that leave least over, pushing or pulling."""
+        x = -np.einsum("nij,ni->nj", self._inverse, self.loads.load)
+        return np.asarray(x.reshape(self.loads.count, self.loads.contacts, 3))
 
     @cached_property
     def _inverse(self) -> Array:
