@@ -6,9 +6,11 @@ import subprocess
 import sys
 
 import jsonschema
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import bodyplan as bp
 from bodyplan.cli import app
 from bodyplan.job import WRITTEN
 from bodyplan.metrics import Metrics
@@ -202,6 +204,16 @@ def test_export(finished, tmp_path, suffix):
     assert again.exit_code == 2 and "--force" in again.output
     assert bodyplan("export", source, "--to", suffix, "--out", str(target), "--force").exit_code == 0
     assert bodyplan("export", source, "--to", suffix, "--out", str(tmp_path / "m.txt")).exit_code == 2
+
+
+def test_a_plan_that_is_not_solved_is_exported_with_a_warning(finished, tmp_path):
+    motion = bp.load(finished[1] / "motion.npz")
+    status = np.array(motion.status)
+    status[3:] = "limit"
+    motion.replace(status=status).save(tmp_path / "bad.npz")
+    made = bodyplan("export", str(tmp_path / "bad.npz"), "--to", "csv", "--out", str(tmp_path / "bad.csv"))
+    assert made.exit_code == 0
+    assert f"warning: {len(status) - 3} of {len(status)} samples" in made.stderr and "limit" in made.stderr
 
 
 def test_missions_and_robots_are_listed():

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bodyplan as bp
@@ -51,10 +52,26 @@ def test_pages_build_without_a_warning(tmp_path):
     assert made.returncode == 0, made.stderr
     page = (tmp_path / "site" / "families" / "wheels" / "index.html").read_text(encoding="utf-8")
     assert "<math" in page and "$$" not in page
+    reference = (tmp_path / "site" / "reference" / "index.html").read_text(encoding="utf-8")
+    assert "<code>Motion</code>" in reference and not re.search(r":(class|func|meth|mod):", reference)
     # nothing is fetched from elsewhere
     for path in (tmp_path / "site").rglob("*.html"):
         for address in re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="(https?://[^"]+)"', path.read_text("utf-8")):
             pytest.fail(f"{path.name} fetches {address}")
+
+
+def test_the_robot_of_the_tutorial_fits_its_mission(tmp_path):
+    """Its table in place of the ready mission's: the same snake as in the tutorial's Python."""
+    page = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    table = re.findall(r"```toml\n(.*?)```", page, flags=re.S)[0]
+    text = (Path(bp.__file__).parent / "missions" / "ready" / "serpentine.toml").read_text(encoding="utf-8")
+    path = tmp_path / "my.toml"
+    path.write_text(re.sub(r"\[robot\].*?(?=\n\[)", lambda _: table, text, flags=re.S), encoding="utf-8")
+    robot = bp.load_mission(path).robot
+    snake = bp.snake(13, 0.06, radius=0.02, mass=0.08, limits=(-np.pi / 2, np.pi / 2), rate=5.0, effort=1.5)
+    assert robot.joints == snake.joints and robot.mass == pytest.approx(snake.mass)
+    np.testing.assert_allclose(robot.limits, snake.limits)
+    np.testing.assert_allclose(robot.efforts, snake.efforts)
 
 
 def test_every_status_is_explained():

@@ -2,10 +2,15 @@
 
 import importlib.metadata
 import importlib.util
+import sys
+from types import ModuleType
 
+import pytest
 from typer.testing import CliRunner
 
+import bodyplan as bp
 from bodyplan.cli import app, doctor
+from bodyplan.simulate.library import mujoco
 
 
 def test_all_well():
@@ -31,6 +36,22 @@ def test_a_broken_core_fails(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "pint" else whole(name))
     result = CliRunner().invoke(app, ["doctor"])
     assert result.exit_code == 1 and "does not work: pint" in result.output
+
+
+def test_a_library_of_which_a_part_is_left(monkeypatch):
+    whole = importlib.metadata.version
+
+    def version(name):
+        if name == "mujoco":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return whole(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", version)
+    found = {f.what: f for f in doctor.findings()}
+    assert found["mujoco"].ok is False and "--force-reinstall" in found["mujoco"].for_
+    monkeypatch.setitem(sys.modules, "mujoco", ModuleType("mujoco"))
+    with pytest.raises(bp.errors.MissingExtraError):
+        mujoco()
 
 
 def test_an_old_python_is_named(monkeypatch):

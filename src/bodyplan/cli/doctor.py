@@ -54,7 +54,11 @@ def findings() -> Iterator[Finding]:
     yield Finding("Python", version, fits, "3.11 or newer" if fits else "too old: bodyplan needs 3.11 or newer")
     for name, (module, extra, purpose) in LIBRARIES.items():
         if importlib.util.find_spec(module) is not None:
-            yield Finding(name, importlib.metadata.version(name), True, purpose)
+            try:
+                yield Finding(name, importlib.metadata.version(name), True, purpose)
+            except importlib.metadata.PackageNotFoundError:
+                again = f"pip install --force-reinstall {name}"
+                yield Finding(name, "only in parts", False, f"{purpose}; get it with: {again}")
         elif extra:
             yield Finding(name, "missing", None, f"{purpose}; get it with: pip install 'bodyplan[{extra}]'")
         else:

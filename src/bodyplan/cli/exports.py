@@ -58,4 +58,10 @@ def export(
                 raise InputError(f"--option {text}: must be KEY=VALUE.")
             options[key.strip()] = number_or_text(value.strip())
         refuse_existing(target, force)
-        typer.echo(save(motion_of(mission, set_), target, **options))
+        motion = motion_of(mission, set_)
+        bad = motion.t[motion.status != "ok"]
+        if len(bad):
+            count = f"{len(bad)} of {len(motion.t)} samples"
+            said = f"{motion.status[motion.status != 'ok'][0]}, from t = {bad[0]:.4g} s on"
+            typer.echo(f"warning: {count} of this plan are not solved ({said}); they are written as they are", err=True)
+        typer.echo(save(motion, target, **options))

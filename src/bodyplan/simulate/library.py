@@ -15,6 +15,8 @@ def mujoco() -> Any:
         import mujoco
     except ImportError as error:
         raise MissingExtraError("mujoco", "physics", "simulation") from error
+    if not hasattr(mujoco, "MjSpec"):  # an empty folder is left where a part of it was uninstalled
+        raise MissingExtraError("mujoco", "physics", "simulation")
     return mujoco
 
 
