@@ -107,3 +107,18 @@ def test_failed_samples_raise_on_request(motion):
     with pytest.raises(bp.SolveError, match=r"out_of_reach.*0\.4 s") as caught:
         spoiled.raise_if_failed()
     assert caught.value.status == "out_of_reach" and caught.value.index == 4
+
+
+def test_the_joint_that_is_farthest_beyond_its_limits_is_named():
+    robot = bp.snake(4, 0.1, limits=(-0.5, 0.5))
+    t = np.arange(10.0)
+    q, base = np.zeros((10, 3)), np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (10, 1))
+    q[5, 2], q[6, 0] = -0.75, 0.6
+    q[8, 0] = 9.0  # not a sample that is said to be beyond
+    status = np.array(["ok"] * 4 + ["limit"] * 3 + ["ok"] * 3, dtype="U24")
+    made = bp.Motion(
+        robot=robot, ground=bp.Plane(), gait={"kind": "none"}, t=t, base=base, q=q, qd=0.0 * q, qdd=0.0 * q,
+        residual=np.zeros(10), status=status,
+    )  # fmt: skip
+    with pytest.raises(bp.SolveError, match=r"beyond its limits is 'yaw3', by 0\.25 at 5 s"):
+        made.raise_if_failed()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bodyplan.arrays import Array, TextArray, finite, frozen
+from bodyplan.arrays import Array, IntArray, TextArray, finite, frozen
 from bodyplan.errors import InputError, SolveError, Status, UnknownNameError
 from bodyplan.ground.base import Ground
 from bodyplan.robot.model import Robot
@@ -157,12 +157,26 @@ class Motion:
         return self.q[:, self.robot.joints.index(name)]
 
     def raise_if_failed(self) -> Motion:
-        """This motion, or SolveError naming the first sample that was not solved."""
+        """This motion, or SolveError naming the first sample that was not solved, and of joints beyond their limits the
+        farthest one."""
         bad = np.flatnonzero(self.status != Status.OK.value)
         if len(bad):
             i = int(bad[0])
-            raise SolveError(str(self.status[i]), f"at t = {self.t[i]:.6g} s ({len(bad)} of {len(self.t)} samples)", i)
+            said = f"at t = {self.t[i]:.6g} s ({len(bad)} of {len(self.t)} samples){self.beyond_limits(bad)}"
+            raise SolveError(str(self.status[i]), said, i)
         return self
+
+    def beyond_limits(self, samples: IntArray) -> str:
+        """In words which joint is farthest beyond its limits, by how much (rad or m) and when, at those of some
+        ``samples`` (k,) whose status says "limit"; "" where there are none."""
+        rows = samples[self.status[samples] == Status.LIMIT.value]
+        low, high = self.robot.limits.T
+        beyond = np.maximum(low - self.q[rows], self.q[rows] - high)
+        if not beyond.size or not beyond.max() > 0.0:
+            return ""
+        row, column = (int(k) for k in np.unravel_index(beyond.argmax(), beyond.shape))
+        by, when = beyond[row, column], self.t[rows[row]]
+        return f"; the farthest joint beyond its limits is {self.robot.joints[column]!r}, by {by:.4g} at {when:.4g} s"
 
     def replace(self, **changes: Any) -> Motion:
         """A copy with some fields changed (and checked again)."""

@@ -42,7 +42,7 @@ def export(
 ) -> None:
     """Write a motion in another format: for a robot, ROS 2, a 3D program, a simulator, a table."""
     with bad_input():
-        from bodyplan.errors import InputError
+        from bodyplan.errors import InputError, SolveError
         from bodyplan.export import format_named, save
         from bodyplan.files import refuse_existing
 
@@ -59,9 +59,8 @@ def export(
             options[key.strip()] = number_or_text(value.strip())
         refuse_existing(target, force)
         motion = motion_of(mission, set_)
-        bad = motion.t[motion.status != "ok"]
-        if len(bad):
-            count = f"{len(bad)} of {len(motion.t)} samples"
-            said = f"{motion.status[motion.status != 'ok'][0]}, from t = {bad[0]:.4g} s on"
-            typer.echo(f"warning: {count} of this plan are not solved ({said}); they are written as they are", err=True)
+        try:
+            motion.raise_if_failed()
+        except SolveError as error:
+            typer.echo(f"warning: this plan is not solved everywhere ({error}); it is written as it is", err=True)
         typer.echo(save(motion, target, **options))

@@ -324,5 +324,5 @@ def trouble(motion: Motion) -> str:
     bad = np.flatnonzero(motion.status != "ok")
     reasons = "; ".join(plan_warnings(motion)[:2])
     count = f"{len(bad)} of {len(motion.t)} samples"
-    said = f"{motion.status[bad[0]]} at t = {motion.t[bad[0]]:.4g} s ({count})"
+    said = f"{motion.status[bad[0]]} at t = {motion.t[bad[0]]:.4g} s ({count}){motion.beyond_limits(bad)}"
     return f"{said}: {reasons}" if reasons else said
