@@ -217,6 +217,25 @@ def test_a_plan_that_is_not_solved_is_exported_with_a_warning(finished, tmp_path
     assert f"{len(status) - 3} of {len(status)} samples" in made.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("run conc", {"concertina", "concertina-scales", "concertina-paper", "concertina-literal", "concertina-tuned"}),
+        ("missions carry-d", {"carry-dem"}),
+        ("export spiral --to m", {"mcap", "mjcf"}),
+        ("papers w", {"wheels"}),
+        ("doc", {"doctor"}),
+    ],
+)
+def test_the_shell_completes_names(words, completed):
+    """As bash asks, once --install-completion was run."""
+    line = f"bodyplan {words}"
+    asked = {"_BODYPLAN_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1)}
+    code = "from bodyplan.cli import app; app(prog_name='bodyplan')"
+    made = subprocess.run([sys.executable, "-c", code], env=os.environ | asked, capture_output=True, text=True)
+    assert set(made.stdout.split()) == completed
+
+
 def test_missions_and_robots_are_listed():
     listed = bodyplan("missions")
     assert listed.exit_code == 0 and "concertina-scales" in listed.output and "sinus-lifting" in listed.output

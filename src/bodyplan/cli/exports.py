@@ -26,7 +26,9 @@ def _list(value: bool) -> None:
 
 def export(
     mission: MotionArgument,
-    to: Annotated[str, typer.Option(metavar="FORMAT", help=f"{_NAMES} (see --list).")],
+    to: Annotated[
+        str, typer.Option(metavar="FORMAT", help=f"{_NAMES} (see --list).", autocompletion=lambda: list(FORMATS))
+    ],
     out: Annotated[
         Path | None, typer.Option(help="File to write (default: NAME and the format's suffix here).")
     ] = None,

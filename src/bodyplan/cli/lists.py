@@ -6,11 +6,14 @@ from typing import Annotated
 
 import typer
 
+from bodyplan.cli.options import missions_like
 from bodyplan.terminal import bad_input, print_table
 
 
 def missions(
-    name: Annotated[str | None, typer.Argument(help="Print this mission's file, to copy and change.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="Print this mission's file, to copy and change.", autocompletion=missions_like)
+    ] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the options of every kind as JSON Schema.")] = False,
 ) -> None:
     """List the ready missions, or print one."""

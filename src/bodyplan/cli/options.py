@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,11 +11,26 @@ if TYPE_CHECKING:
     from bodyplan.missions import Mission
     from bodyplan.motion import Motion
 
+
+def missions_like(incomplete: str) -> list[str]:
+    """Names of ready missions that begin so, for the shell, which waits: no library is loaded for them. Files it
+    completes by itself."""
+    folder = Path(__file__).parents[1] / "missions" / "ready"
+    return sorted(path.stem for path in folder.glob("*.toml") if path.stem.startswith(incomplete))
+
+
 MissionArgument = Annotated[
-    str, typer.Argument(help="A ready mission's name (see: bodyplan missions) or a .toml file.")
+    str,
+    typer.Argument(
+        help="A ready mission's name (see: bodyplan missions) or a .toml file.", autocompletion=missions_like
+    ),
 ]
 MotionArgument = Annotated[
-    str, typer.Argument(help="A mission, a motion saved as .npz, or the folder of a run, for example runs/concertina.")
+    str,
+    typer.Argument(
+        help="A mission, a motion saved as .npz, or the folder of a run, for example runs/concertina.",
+        autocompletion=missions_like,
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,

@@ -14,7 +14,12 @@ if TYPE_CHECKING:
     from bodyplan.papers import Results, Row
 
 NameArgument = Annotated[
-    str | None, typer.Argument(metavar="[NAME]", help="concertina, acm, rectilinear, legs or wheels (default: all).")
+    str | None,
+    typer.Argument(
+        metavar="[NAME]",
+        help="concertina, acm, rectilinear, legs or wheels (default: all).",
+        autocompletion=lambda: ["concertina", "acm", "rectilinear", "legs", "wheels"],
+    ),
 ]
 
 
