@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from bodyplan.show.live.body import Body
 from bodyplan.show.live.of_motion import source_of
 from bodyplan.show.live.tracks import Snapshot, Tracks, lowest
 from bodyplan.spatial.rotations import rotate
+from bodyplan.viewing import view
 from report_cases import cart, caterpillar, diverged_trial, follower, roller, snake_motion, snake_trial, stick
 
 pytest.importorskip("viser", reason="viser (extra view) is not installed")
@@ -228,6 +230,12 @@ def test_show_serves_and_opens(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "stopped" in repr(viewer)
     with pytest.raises(InputError, match="motion: expected a Motion"):
         bp.show(3, block=False)  # type: ignore[arg-type]
+
+
+def test_the_folder_of_a_run_is_its_motion(tmp_path: Path) -> None:
+    snake_motion().save(tmp_path / "motion.npz")
+    with view(tmp_path, port=0) as viewer:
+        assert viewer.session.state.motion == snake_motion()
 
 
 def test_view_refuses_what_it_cannot_show(busy: int) -> None:

@@ -12,7 +12,7 @@ from bodyplan.check import Report
 from bodyplan.errors import InputError, MissingExtraError
 from bodyplan.gaits.base import Gait
 from bodyplan.job import mission_times, plan_mission, simulate_mission
-from bodyplan.missions import Mission, load_mission, parse_mission
+from bodyplan.missions import Mission, load_mission, parse_mission, ready_missions
 from bodyplan.motion import Motion
 from bodyplan.plan import plan
 from bodyplan.robot.files import toml_value
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 def view(
     mission: Mission | str | Path, *, overrides: Iterable[str] = (), port: int | None = None, simulate: bool = False
 ) -> Viewer:
-    """A running viewer of a mission, or of a motion saved as .npz; ``simulate``: execute it in physics at once.
+    """A running viewer of a mission, or of a motion saved as .npz or in the folder of a run; ``simulate``: execute it
+    in physics at once.
 
     ``port``: see :func:`bodyplan.show.live.server.start`. Raises InputError for a bad mission or a busy port,
     MissingExtraError without viser, or without MuJoCo where it is to simulate.
@@ -37,6 +38,9 @@ def view(
         raise MissingExtraError("viser", "view", "the live viewer")
     if simulate and find_spec("mujoco") is None:
         raise MissingExtraError("mujoco", "physics", "simulation (or view with --no-simulate)")
+    if isinstance(mission, (str, Path)) and str(mission) not in ready_missions():
+        saved = Path(mission) / "motion.npz"
+        mission = saved if saved.is_file() else mission
     if isinstance(mission, (str, Path)) and str(mission).endswith(".npz"):
         if tuple(overrides):
             raise InputError("--set: a saved motion cannot be changed; give its mission instead.")

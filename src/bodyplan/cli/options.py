@@ -41,8 +41,6 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Replace what is ther
 
 def motion_of(mission: str, overrides: list[str] | None) -> Motion:
     """The motion in an .npz file or in the folder of a run, or the plan of a mission."""
-    from pathlib import Path
-
     from bodyplan.errors import InputError
     from bodyplan.missions import ready_missions
 
