@@ -75,6 +75,22 @@ class Loads:
         """Singular parts of the equations."""
         return Parts.of(self.equations)
 
+    def balance(self, i: int) -> Balance:
+        """The equations of item i."""
+        one = slice(i, i + 1)
+        return balances_of(self.equations[one], self.load[one], Parts(*(part[one] for part in self.parts)))[0]
+
+    @cached_property
+    def inverse(self) -> Array:
+        """(n, 6, 3k): transposed pseudo-inverses of the equations."""
+        return self.parts.inverse
+
+    @property
+    def smallest(self) -> Array:
+        """(n, k, 3): the smallest forces of those that leave least over, pushing or pulling."""
+        x = -np.einsum("nij,ni->nj", self.inverse, self.load)
+        return np.asarray(x.reshape(self.count, self.contacts, 3))
+
     def newtons(self, x: Array) -> Array:
         """(n, k, 3) N in the world, of components (n, k, 3)."""
         return np.asarray((self.frames @ x[..., None])[..., 0] * self.force[:, None, None])

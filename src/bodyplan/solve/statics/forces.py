@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array, BoolArray
 from bodyplan.errors import InputError, Status, UnknownNameError
 from bodyplan.solve.statics.cones import CONE, RAY, Cones, Family, ratios
-from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, Memory, balance, friction
+from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, Memory, friction
 from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import SHORT, Solved, at_least_factor, solve_item
 from bodyplan.solve.statics.outcome import Outcome, shaped
@@ -87,7 +87,7 @@ def forces_of(loads: Loads, mu: Array, objective: str = "min_norm") -> ContactFo
     for i in range(n):
         if loads.force[i] == 0.0 or (objective == "min_norm" and np.isfinite(x[i, 0, 0])):
             continue
-        held, on = balance(loads.equations[i], loads.load[i]), loads.touching[i]
+        held, on = loads.balance(i), loads.touching[i]
         start = None if memory is None else (*loads.recall(i, held, memory[0]), memory[1])
         memory = None
         if objective == "min_ratio" and held.left <= ROUNDING:
@@ -116,7 +116,7 @@ def forces_of(loads: Loads, mu: Array, objective: str = "min_norm") -> ContactFo
 
 def smallest_free(loads: Loads, mu: Array) -> Array:
     """(n, k, 3) components of the smallest forces where these are within all cones mu (n, k), else nan."""
-    x = -np.einsum("nij,ni->nj", loads.parts.inverse, loads.load).reshape(loads.count, loads.contacts, 3)
+    x = loads.smallest
     kind = np.where(loads.touching, np.where(mu > 0.0, CONE, RAY), 0)
     ray = np.broadcast_to([1.0, 0.0, 0.0], x.shape)
     rounding = 1e-14 * np.abs(x).max(axis=(1, 2))

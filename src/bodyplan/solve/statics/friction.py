@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from bodyplan.arrays import Array
 from bodyplan.errors import Status
 from bodyplan.solve.statics.cones import Family, ratios
-from bodyplan.solve.statics.equilibrium import ROUNDING, Balance, Loads, Memory, Parts, balances_of
+from bodyplan.solve.statics.equilibrium import ROUNDING, Loads, Memory
 from bodyplan.solve.statics.factor import Factor, Start, least_factor
 from bodyplan.solve.statics.item import at_least_factor
 from bodyplan.solve.statics.outcome import Outcome, shaped
@@ -76,7 +75,7 @@ def required_friction(
             reasons[i] = "no contacts that only push hold it, whatever their friction"
             attained[i] = False
         elif found.attained and forces:
-            solved = at_least_factor(least.balance(i), least.family(i), found)
+            solved = at_least_factor(loads.balance(i), least.family(i), found)
             x[i] = found.x if solved is None else solved.x
         if np.isfinite(found.s) and not found.exact:
             status[i] = Status.NOT_CONVERGED.value
@@ -96,16 +95,7 @@ class LeastFriction:
 
     def __init__(self, loads: Loads) -> None:
         self.loads = loads
-        self._balances: dict[int, Balance] = {}
         self._memories: dict[int, tuple[Memory, float]] = {}
-
-    def balance(self, i: int) -> Balance:
-        """The equations of item i."""
-        if i not in self._balances:
-            one = slice(i, i + 1)
-            parts = Parts(*(values[one] for values in self.loads.parts))
-            self._balances[i] = balances_of(self.loads.equations[one], self.loads.load[one], parts)[0]
-        return self._balances[i]
 
     def family(self, i: int) -> Family:
         """The cones of item i: one coefficient for all contacts."""
@@ -114,7 +104,7 @@ class LeastFriction:
 
     def at(self, i: int) -> Factor:
         """The least coefficient of item i, whose load is not zero."""
-        loads, held = self.loads, self.balance(i)
+        loads, held = self.loads, self.loads.balance(i)
         if held.left > ROUNDING:
             return Factor(np.inf, np.full((loads.contacts, 3), np.nan), np.zeros(len(held.b)), loads.touching[i])
         start: Start | None = None
@@ -134,7 +124,7 @@ class LeastFriction:
         items are those of one that was solved, mended, and such as alternating projections find.
         """
         bound, most, known = np.array(bound), -1.0, np.full(self.loads.count, np.nan)
-        unheld = (self.loads.left_over(self._smallest()) > ROUNDING) & (bound > -np.inf)
+        unheld = (self.loads.left_over(self.loads.smallest) > ROUNDING) & (bound > -np.inf)
         if unheld.any():
             known[unheld] = np.inf
             return known
@@ -147,7 +137,7 @@ class LeastFriction:
                 bound = np.fmin(bound, self.bounds(i, found.x))
             if found.s > most:
                 most = found.s
-                args = self.loads.equations, self._inverse, self.loads.load, self.loads.touching
+                args = self.loads.equations, self.loads.inverse, self.loads.load, self.loads.touching
                 project(*args, most, ROUNDS, x, bound)
         return known
 
@@ -159,14 +149,5 @@ class LeastFriction:
             here = (np.swapaxes(self.loads.frames, -1, -2) @ world)[..., 0] / self.loads.force[:, None, None]
             flat = here.reshape(len(here), -1)
             rest = np.einsum("nij,nj->ni", self.loads.equations, flat) + self.loads.load
-            mended = (flat - np.einsum("nij,ni->nj", self._inverse, rest)).reshape(here.shape)
+            mended = (flat - np.einsum("nij,ni->nj", self.loads.inverse, rest)).reshape(here.shape)
         return np.where(np.isfinite(mended).all(axis=(1, 2)), ratios(mended).max(axis=1), np.inf)
-
-    def _smallest(self) -> Array:
-        """(n, k, 3): the smallest forces that leave least over, pushing or pulling."""
-        x = -np.einsum("nij,ni->nj", self._inverse, self.loads.load)
-        return np.asarray(x.reshape(self.loads.count, self.loads.contacts, 3))
-
-    @cached_property
-    def _inverse(self) -> Array:
-        return self.loads.parts.inverse

@@ -12,7 +12,7 @@ from bodyplan.arrays import Array, finite
 from bodyplan.errors import InputError, Status
 from bodyplan.solve.statics.cones import Cones
 from bodyplan.solve.statics.conic import least
-from bodyplan.solve.statics.equilibrium import Balance, Loads, balance, friction
+from bodyplan.solve.statics.equilibrium import Balance, Loads, friction
 from bodyplan.solve.statics.item import on_faces, solve_item
 from bodyplan.solve.statics.outcome import Outcome, shaped
 from bodyplan.solve.statics.polish import polish_gain
@@ -73,9 +73,8 @@ def torque_interval(
     x = np.full((2, n, m, k, 3), np.nan)
     status = np.full(n, Status.OK.value, dtype="<U16")
     reasons = np.full(n, "", dtype=object)
-    equations = loads.equations
     for i in range(n):
-        held = balance(equations[i], loads.load[i])
+        held = loads.balance(i)
         solved = solve_item(held, flat[i], loads.touching[i])
         status[i], reasons[i] = solved.status.value, solved.reason
         if solved.status is not Status.OK:
