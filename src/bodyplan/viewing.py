@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bodyplan.check import Report
-from bodyplan.errors import InputError, MissingExtraError
+from bodyplan.errors import MissingExtraError
 from bodyplan.gaits.base import Gait
 from bodyplan.job import mission_times, plan_mission, simulate_mission
-from bodyplan.missions import Mission, load_mission, parse_mission, ready_missions
+from bodyplan.missions import Mission, load_mission, parse_mission
+from bodyplan.missions.files import saved_motion
 from bodyplan.motion import Motion
 from bodyplan.plan import plan
 from bodyplan.robot.files import toml_value
@@ -38,15 +39,12 @@ def view(
         raise MissingExtraError("viser", "view", "the live viewer")
     if simulate and find_spec("mujoco") is None:
         raise MissingExtraError("mujoco", "physics", "simulation (or view with --no-simulate)")
-    if isinstance(mission, (str, Path)) and str(mission) not in ready_missions():
-        saved = Path(mission) / "motion.npz"
-        mission = saved if saved.is_file() else mission
-    if isinstance(mission, (str, Path)) and str(mission).endswith(".npz"):
-        if tuple(overrides):
-            raise InputError("--set: a saved motion cannot be changed; give its mission instead.")
-        source = source_of(Motion.load(mission))
+    if isinstance(mission, Mission):
+        source = mission_source(mission)
+    elif (saved := saved_motion(mission, overrides)) is not None:
+        source = source_of(Motion.load(saved))
     else:
-        source = mission_source(mission if isinstance(mission, Mission) else load_mission(mission, tuple(overrides)))
+        source = mission_source(load_mission(mission, tuple(overrides)))
     from bodyplan.show.live import Viewer
 
     viewer = Viewer(source, port=port)

@@ -41,17 +41,12 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Replace what is ther
 
 def motion_of(mission: str, overrides: list[str] | None) -> Motion:
     """The motion in an .npz file or in the folder of a run, or the plan of a mission."""
-    from bodyplan.errors import InputError
-    from bodyplan.missions import ready_missions
+    from bodyplan.missions.files import saved_motion
 
-    saved = Path(mission)
-    if mission not in ready_missions() and (saved / "motion.npz").is_file():
-        saved /= "motion.npz"
-    if saved.suffix == ".npz":
+    saved = saved_motion(mission, overrides or ())
+    if saved is not None:
         from bodyplan.export import load
 
-        if overrides:
-            raise InputError("--set: a saved motion cannot be changed; give its mission instead.")
         return load(saved)
     from bodyplan.job import plan_mission
     from bodyplan.missions import load_mission

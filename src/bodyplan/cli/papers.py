@@ -13,12 +13,19 @@ from bodyplan.terminal import bad_input, print_table, progress_bar, say
 if TYPE_CHECKING:
     from bodyplan.papers import Results, Row
 
+
+def _papers() -> list[str]:
+    from bodyplan.papers import PAPERS
+
+    return list(PAPERS)
+
+
 NameArgument = Annotated[
     str | None,
     typer.Argument(
         metavar="[NAME]",
         help="concertina, acm, rectilinear, legs or wheels (default: all).",
-        autocompletion=lambda: ["concertina", "acm", "rectilinear", "legs", "wheels"],
+        autocompletion=_papers,
     ),
 ]
 

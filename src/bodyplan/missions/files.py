@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import resources
@@ -51,6 +51,19 @@ def ready_missions() -> dict[str, str]:
     folder = resources.files("bodyplan.missions") / "ready"
     found = {p.name.removesuffix(".toml"): p for p in folder.iterdir() if p.name.endswith(".toml")}
     return {name: found[name].read_text(encoding="utf-8") for name in sorted(found)}
+
+
+def saved_motion(mission: str | Path, overrides: Iterable[str] = ()) -> Path | None:
+    """The .npz file that ``mission`` names, itself or by the folder of a run; None for missions, ready ones first.
+    InputError where a saved motion is to be changed by ``overrides``."""
+    saved = Path(mission)
+    if str(mission) not in ready_missions() and (saved / "motion.npz").is_file():
+        saved /= "motion.npz"
+    if saved.suffix != ".npz":
+        return None
+    if tuple(overrides):
+        raise InputError("--set: a saved motion cannot be changed; give its mission instead.")
+    return saved
 
 
 def load_mission(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Mission:
