@@ -38,6 +38,13 @@ def moves(parameter: Parameter) -> list[float | int]:
     return [parameter.si(v) for v in inside[:2]]
 
 
+def opened(name: str) -> Source:
+    """A mission, planned and held in memory as the viewer does when it starts."""
+    source = mission_source(load_mission(name))
+    memory.hold()
+    return source
+
+
 def one(source: Source, preview: bool) -> dict[str, float]:
     """Seconds of a re-plan by slider; sliders whose neighbouring values are refused are left out."""
     gait, plan = source.gait, source.plan
@@ -92,15 +99,13 @@ def main() -> None:
     if asked.values is not None:
         print(f"{'mission':22} {'plans':>5} {'few: median':>12} {'90 %':>9} {'95 %':>9} {'worst':>9}  above the aim")
         for name in asked.missions or ready_missions():
-            source = mission_source(load_mission(name))
+            source = opened(name)
             one(source, True)
             tell(name, spread(source, max(asked.values, 2)))
         return
     print(f"{'mission':22} {'few: median':>12} {'worst':>8}  {'all: median':>12}  slowest slider")
     for name in asked.missions or ready_missions():
-        source = mission_source(load_mission(name))
-        # as the viewer does when it starts
-        memory.hold()
+        source = opened(name)
         few, every = one(source, True), one(source, False)
         slowest = max(few, key=lambda k: few[k])
         middle, worst = statistics.median(few.values()), few[slowest]

@@ -72,7 +72,7 @@ def _state(path: Path) -> list[int] | None:
 
 
 def _text(path: Path) -> str:
-    """ "" of what cannot be read, as of a lock that an editor leaves."""
+    """What a file says; nothing where it cannot be read, as a lock that an editor leaves."""
     with suppress(OSError, ValueError):
         return path.read_text(encoding="utf-8")
     return ""

@@ -87,7 +87,9 @@ def follow(ground: Field, planes: Planes, phi: Array, radius: Array) -> Contacts
     outcome = np.empty(len(planes), dtype=np.int64)
     contact_kernel.follow(land, rows, room, chi, away, outcome)
     none = np.full(len(planes), np.nan)
-    return _measured_in_kernel(land, planes, chi, away, none, np.zeros(len(planes), dtype=np.bool_), room, outcome)
+    return _measured_in_kernel(
+        land, rows, planes.lean, chi, away, none, np.zeros(len(planes), dtype=np.bool_), room, outcome
+    )
 
 
 def _find(ground: Terrain, planes: Planes, start: Array | None) -> Contacts:
@@ -162,12 +164,13 @@ def _in_kernels(ground: Field, planes: Planes, start: Array | None) -> Contacts:
         land, rows, planes.lean, feet, sure, settled, edged, SAME, search.CERTAIN, limits, room,
         chi, radius, second, corner, outcome,
     )  # fmt: skip
-    return _measured_in_kernel(land, planes, chi, radius, second, corner, room, outcome)
+    return _measured_in_kernel(land, rows, planes.lean, chi, radius, second, corner, room, outcome)
 
 
 def _measured_in_kernel(
     land: FieldArrays,
-    planes: Planes,
+    rows: Array,
+    lean: Array,
     chi: Array,
     radius: Array,
     second: Array,
@@ -175,14 +178,15 @@ def _measured_in_kernel(
     room: Room,
     outcome: IntArray,
 ) -> Contacts:
-    """Everything about the contacts at ``chi``, ``radius``, as :func:`_measured`."""
+    """Everything about the contacts at ``chi``, ``radius``, of planes ``rows`` (n, 9) that ``lean`` (n,), as
+    :func:`_measured`."""
     from bodyplan.gaits.carry import contact_kernel
 
-    count = len(planes)
+    count = len(rows)
     phi, curvature, residual = np.empty(count), np.empty(count), np.empty(count)
     point, normal, hessian = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 2, 2))
     contact_kernel.measure(
-        land, planes.rows, planes.lean, chi, radius, corner, RESIDUAL, room,
+        land, rows, lean, chi, radius, corner, RESIDUAL, room,
         phi, point, normal, curvature, residual, hessian, outcome,
     )  # fmt: skip
     return Contacts(phi, radius, point, normal, curvature, residual, second, corner, hessian, outcome)

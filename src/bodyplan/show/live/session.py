@@ -110,7 +110,7 @@ class Session:
             self.choices = choices_of(source.gait)
         self._lock = threading.RLock()
         self._wish = 0
-        self._gait = self._shown_gait = source.gait
+        self._shown_gait = source.gait
         self._good: tuple[Gait | None, Motion] = (source.gait, source.motion)
         self._cost: dict[bool, float] = {False: math.inf, True: 0.0}
         self._stop_physics = threading.Event()
@@ -149,7 +149,6 @@ class Session:
             return
         with self._lock:
             self._wish += 1
-            self._gait = wanted
             preview = self.source.previews and self._cost[False] > FLUENT
             wait = REST if self._cost[preview] > SLOW else 0.0
             self._judge.forget()
